@@ -1,0 +1,90 @@
+//! Events as decoders hand them over.
+
+use alloc::vec::Vec;
+
+use crate::units::{CameraMicros, HostMicros};
+
+/// The sign of a brightness change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Polarity {
+    /// The pixel became darker by one threshold.
+    Off = 0,
+    /// The pixel became brighter by one threshold.
+    On = 1,
+}
+
+impl Polarity {
+    /// `On` for `true`.
+    pub fn from_on(on: bool) -> Self {
+        if on { Self::On } else { Self::Off }
+    }
+
+    /// Whether this is `On`.
+    pub fn is_on(self) -> bool {
+        self == Self::On
+    }
+}
+
+/// One brightness change at one pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Event {
+    /// When, on the camera's clock.
+    pub t: CameraMicros,
+    /// Column, 0 at the left.
+    pub x: u16,
+    /// Row, 0 at the top.
+    pub y: u16,
+    /// Brighter or darker.
+    pub polarity: Polarity,
+}
+
+/// The size of a sensor in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Geometry {
+    /// Columns.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+}
+
+impl Geometry {
+    /// Width times height.
+    pub fn pixels(self) -> usize {
+        usize::from(self.width) * usize::from(self.height)
+    }
+
+    /// Whether column `x`, row `y` is on the sensor.
+    pub fn contains(self, x: u16, y: u16) -> bool {
+        x < self.width && y < self.height
+    }
+}
+
+/// Events that reached the host together. The batch is lent to the decoder, filled, consumed, and lent again, so that its
+/// memory is allocated once.
+#[derive(Debug, Clone, Default)]
+pub struct EventBatch {
+    /// In the order of their times, as the camera sent them.
+    pub events: Vec<Event>,
+    /// When the transfer that held them arrived.
+    pub arrival: HostMicros,
+    /// The camera time up to which this batch is complete, known even when nothing happened (the camera's own time words);
+    /// `None` if the camera said nothing about time.
+    pub reached: Option<CameraMicros>,
+    /// Events that the camera, the link or the decoder is known to have lost since the batch before.
+    pub lost: u64,
+}
+
+impl EventBatch {
+    /// An empty batch with room for `capacity` events.
+    pub fn with_capacity(capacity: usize) -> Self {
+        Self { events: Vec::with_capacity(capacity), ..Self::default() }
+    }
+
+    /// Empties the batch and keeps its memory.
+    pub fn clear(&mut self) {
+        self.events.clear();
+        self.reached = None;
+        self.lost = 0;
+    }
+}
