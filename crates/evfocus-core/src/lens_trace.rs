@@ -90,11 +90,22 @@ impl<T: Timestamp> LensTrace<T> {
         {
             return Err(LensTraceError::NotLater { time: time.micros(), last: last.micros() });
         }
+        self.append(time, position);
+        Ok(())
+    }
+
+    fn append(&mut self, time: T, position: LensPosition) {
         if self.samples.len() == self.capacity {
             self.samples.pop_front();
         }
         self.samples.push_back((time, position));
-        Ok(())
+    }
+
+    /// [`push`](Self::push), where a sample that is not later than the last one is no news and is left out.
+    pub fn push_if_later(&mut self, time: T, position: LensPosition) {
+        if self.last().is_none_or(|(last, _)| time > last) {
+            self.append(time, position);
+        }
     }
 
     /// Forgets all samples and keeps the memory.
@@ -144,7 +155,8 @@ impl<T: Timestamp> LensTrace<T> {
             });
         }
         let after = self.samples.partition_point(|(time, _)| (time.micros() as f64) < micros).max(1);
-        let (Some(&(t0, p0)), Some(&(t1, p1))) = (self.samples.get(after - 1), self.samples.get(after)) else {
+        let (Some(&(t0, p0)), Some(&(t1, p1))) = (self.samples.get(after - 1), self.samples.get(after))
+        else {
             // Only one sample, and it is exactly at the time asked for.
             return Ok(self.samples.front().map_or(LensPosition(0.0), |&(_, position)| position));
         };

@@ -9,10 +9,36 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+mod analysis;
+mod clock_map;
+pub mod controller;
+mod counter;
+mod curve;
 mod event;
+mod event_store;
+mod hot_pixels;
 mod lens_trace;
+mod measure;
+mod quality;
+mod report;
+pub mod search;
+mod sweep;
 mod units;
 
+pub use analysis::{Analyzer, SweepLimits};
+pub use clock_map::{ClockEvent, ClockMap, ClockMapQuality, NoClockYet};
+pub use controller::{Controller, ControllerConfig};
+pub use counter::{CounterError, CumulativeCounter, EventCounts};
+pub use curve::{CurvePoint, FocusCurve};
 pub use event::{Event, EventBatch, Geometry, Polarity};
+pub use event_store::EventStore;
+pub use hot_pixels::HotPixels;
 pub use lens_trace::{Leg, LensSample, LensTrace, LensTraceError};
-pub use units::{CameraMicros, EventRate, HostMicros, LensPosition, LensRange, LensSpeed, Timestamp, UnitError};
+pub use measure::{PixelCounts, event_rate};
+pub use quality::SweepQuality;
+pub use report::{Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport};
+pub use search::{Estimate, Method, SearchError, Searcher};
+pub use sweep::{Sweep, SweepCapacity, SweepRecorder};
+pub use units::{
+    CameraMicros, EventRate, HostMicros, LensPosition, LensRange, LensSpeed, Timestamp, UnitError,
+};

@@ -1,0 +1,542 @@
+//! The focus controller: a pure state machine from (input, now) to actions.
+//!
+//! ```text
+//!                 Focus                arrived        rested                 arrived               counts complete
+//!  Idle --------------------> ToStart ---------> Resting ------> Sweeping(0) -------> Draining(0) ------------------+
+//!   |  \ needs homing           ^                                                                                   |
+//!   |   +------------> Homing --+ at rest                                       both directions                     v
+//!   |                                               +---- Draining(1) <------ Sweeping(1) <------------------- [search]
+//!   | MoveTo                                        v          arrived                                              |
+//!   +-------> Moving -> Idle                    [search]                                              one direction |
+//!                                                   |                                                               |
+//!                                                   +-----> Approaching(run-up) -> Approaching(final) <-------------+
+//!                                                               ^                          | arrived
+//!                                                               +------- off target --- Verifying ----> Idle, Focused
+//!
+//!  any state of a run --- failure --> Restoring -> Idle, Failed      (lens or camera gone: lens stopped, Idle, Failed at once)
+//!  any state ------------ Abort ----> lens stopped, Idle
+//! ```
+
+mod config;
+mod motion;
+mod request;
+mod run;
+mod sweeping;
+
+pub use config::{ControllerConfig, OnFailure};
+pub use request::{Accepted, Command, FocusRequest, Mode, Refusal};
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use crate::clock_map::{ClockEvent, ClockMap};
+use crate::event::{EventBatch, Geometry};
+use crate::lens_trace::LensSample;
+use crate::report::{Failure, Outcome, Phase, RunId, RunReport};
+use crate::units::{EventRate, HostMicros, LensPosition, LensSpeed};
+
+use motion::{Motion, Progress};
+use run::Run;
+use sweeping::SweepState;
+
+/// A device that stopped working.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeviceFailure {
+    /// It is gone.
+    Gone,
+    /// It is there and reports a fault.
+    Fault,
+    /// It is there and does not answer.
+    Silent,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, Copy)]
+pub enum Input<'a> {
+    /// The camera sent events, or at least time.
+    Batch(&'a EventBatch),
+    /// The lens said where it is.
+    Lens(LensSample),
+    /// The camera failed; until [`Input::CameraReady`] there is none.
+    CameraFailed(DeviceFailure),
+    /// The camera is (again) there and streams.
+    CameraReady,
+    /// The lens failed; until [`Input::LensReady`] there is none.
+    LensFailed(DeviceFailure),
+    /// The lens is (again) there.
+    LensReady,
+    /// Time went on.
+    Tick,
+}
+
+/// Something to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Action {
+    /// Start homing the lens.
+    Home,
+    /// Start moving the lens.
+    MoveLens {
+        /// Where to.
+        target: LensPosition,
+        /// How fast.
+        speed: LensSpeed,
+    },
+    /// Stop the lens where it is.
+    StopLens,
+    /// A run ended; [`Controller::report`] has its record.
+    RunEnded,
+}
+
+/// libcamera's words for what an autofocus does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FocusState {
+    /// Nothing asked for, or manual mode.
+    Idle,
+    /// A run is under way.
+    Scanning,
+    /// The last run ended in focus, and the lens has not moved since.
+    Focused,
+    /// The last run ended without focus.
+    Failed,
+}
+
+/// What can be seen from outside at any moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Snapshot {
+    /// Manual or auto.
+    pub mode: Mode,
+    /// Idle, scanning, focused or failed.
+    pub state: FocusState,
+    /// What the run under way is doing.
+    pub phase: Option<Phase>,
+    /// The run under way.
+    pub run: Option<RunId>,
+    /// The newest word of the lens.
+    pub lens: Option<LensSample>,
+    /// Events per second over the last tenth of a second.
+    pub event_rate: EventRate,
+    /// Events received since the start.
+    pub events: u64,
+    /// Events known to be lost since the start.
+    pub lost: u64,
+    /// Whether the camera is there.
+    pub camera_ready: bool,
+    /// Whether the lens is there.
+    pub lens_ready: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum State {
+    Idle,
+    Moving(Motion),
+    Homing { since: HostMicros, seen_moving: bool },
+    ToStart(Motion),
+    Resting { since: HostMicros },
+    Sweeping { leg: usize, motion: Motion },
+    Draining { leg: usize, deadline: HostMicros },
+    Approaching { motion: Motion, answer: LensPosition, attempt: u32, run_up: bool },
+    Verifying { since: HostMicros, answer: LensPosition, attempt: u32 },
+    Restoring { motion: Motion, failure: Failure },
+}
+
+/// How often the approach is tried before the lens is said not to keep its position.
+const APPROACHES: u32 = 3;
+/// A lens that has not begun to move this long after the order to home is at its reference already.
+const HOMING_BEGINS: Duration = Duration::from_millis(500);
+/// Over how long the event rate in a snapshot is taken.
+const RATE_WINDOW: Duration = Duration::from_millis(100);
+
+/// The controller.
+#[derive(Debug)]
+pub struct Controller {
+    config: ControllerConfig,
+    mode: Mode,
+    state: State,
+    outcome: FocusState,
+    homed: bool,
+    next_run: u64,
+    run: Option<Run>,
+    report: Option<RunReport>,
+    clock: ClockMap,
+    sweep: SweepState,
+    lens: Option<LensSample>,
+    camera_heard: HostMicros,
+    lens_heard: HostMicros,
+    camera_ready: bool,
+    lens_ready: bool,
+    events: u64,
+    lost: u64,
+    rate_window: (HostMicros, u64),
+    event_rate: EventRate,
+}
+
+impl Controller {
+    /// A controller for a camera of `geometry`. All memory that the event path needs is allocated here.
+    pub fn new(config: ControllerConfig, geometry: Geometry, now: HostMicros) -> Self {
+        Self {
+            mode: Mode::Auto,
+            state: State::Idle,
+            outcome: FocusState::Idle,
+            homed: !config.needs_homing,
+            next_run: 1,
+            run: None,
+            report: None,
+            clock: ClockMap::new(None),
+            sweep: SweepState::new(geometry, &config),
+            lens: None,
+            camera_heard: now,
+            lens_heard: now,
+            camera_ready: true,
+            lens_ready: true,
+            events: 0,
+            lost: 0,
+            rate_window: (now, 0),
+            event_rate: EventRate(0.0),
+            config,
+        }
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &ControllerConfig {
+        &self.config
+    }
+
+    /// The next run gets this number or a higher one: numbers go on after a restart.
+    pub fn number_runs_from(&mut self, first: RunId) {
+        self.next_run = self.next_run.max(first.0);
+    }
+
+    /// The record of the last run that ended.
+    pub fn report(&self) -> Option<&RunReport> {
+        self.report.as_ref()
+    }
+
+    /// How camera time and host time are related.
+    pub fn clock(&self) -> &ClockMap {
+        &self.clock
+    }
+
+    /// The focus curve of the sweep under way, as far as it has come, or of the last one.
+    pub fn live_curve(&self) -> &[crate::CurvePoint] {
+        self.sweep.live_curve()
+    }
+
+    /// What can be seen from outside.
+    pub fn snapshot(&self) -> Snapshot {
+        let scanning = self.run.is_some();
+        Snapshot {
+            mode: self.mode,
+            state: if scanning { FocusState::Scanning } else { self.outcome },
+            phase: self.phase(),
+            run: self.run.as_ref().map(|run| run.id),
+            lens: self.lens,
+            event_rate: self.event_rate,
+            events: self.events,
+            lost: self.lost,
+            camera_ready: self.camera_ready,
+            lens_ready: self.lens_ready,
+        }
+    }
+
+    fn phase(&self) -> Option<Phase> {
+        match self.state {
+            State::Idle | State::Moving(_) => None,
+            State::Homing { .. } => Some(Phase::Homing),
+            State::ToStart(_) => Some(Phase::ToStart),
+            State::Resting { .. } => Some(Phase::Resting),
+            State::Sweeping { leg: 0, .. } => Some(Phase::Sweeping),
+            State::Sweeping { .. } => Some(Phase::Returning),
+            State::Draining { .. } => Some(Phase::Searching),
+            State::Approaching { .. } => Some(Phase::Approaching),
+            State::Verifying { .. } => Some(Phase::Verifying),
+            State::Restoring { .. } => Some(Phase::Restoring),
+        }
+    }
+
+    /// Takes a command.
+    ///
+    /// # Errors
+    /// [`Refusal`] says why the command was not taken; nothing has changed then.
+    pub fn command(
+        &mut self,
+        command: Command,
+        now: HostMicros,
+        actions: &mut Vec<Action>,
+    ) -> Result<Accepted, Refusal> {
+        match command {
+            Command::Focus(request) => self.focus(request, now, actions),
+            Command::Abort => {
+                self.abort(now, actions);
+                Ok(Accepted::Done)
+            }
+            Command::MoveTo(target) => self.move_to(target, now, actions),
+            Command::SetMode(mode) => {
+                if mode != self.mode {
+                    self.abort(now, actions);
+                    self.mode = mode;
+                    self.outcome = FocusState::Idle;
+                }
+                Ok(Accepted::Done)
+            }
+        }
+    }
+
+    fn focus(
+        &mut self,
+        request: FocusRequest,
+        now: HostMicros,
+        actions: &mut Vec<Action>,
+    ) -> Result<Accepted, Refusal> {
+        if self.mode == Mode::Manual {
+            return Err(Refusal::ManualMode);
+        }
+        let plan = request.resolve(&self.config)?;
+        if let Some(run) = &self.run {
+            let same = run.plan == plan || request == FocusRequest::default();
+            return if same { Ok(Accepted::UnderWay(run.id)) } else { Err(Refusal::Busy { run: run.id }) };
+        }
+        if !self.camera_ready {
+            return Err(Refusal::NoCamera);
+        }
+        let Some(lens) = self.lens.filter(|_| self.lens_ready) else {
+            return Err(Refusal::NoLens);
+        };
+        let id = RunId(self.next_run);
+        self.next_run += 1;
+        self.run = Some(Run::new(id, plan, lens.position, now));
+        self.camera_heard = now;
+        self.lens_heard = now;
+        self.sweep.forget();
+        if self.homed {
+            self.go_to_start(now, actions);
+        } else {
+            actions.push(Action::Home);
+            self.enter(State::Homing { since: now, seen_moving: false }, now);
+        }
+        Ok(Accepted::Started(id))
+    }
+
+    fn move_to(
+        &mut self,
+        target: LensPosition,
+        now: HostMicros,
+        actions: &mut Vec<Action>,
+    ) -> Result<Accepted, Refusal> {
+        if let Some(run) = &self.run {
+            return Err(Refusal::Busy { run: run.id });
+        }
+        if !self.config.limits.contains(target) {
+            return Err(Refusal::OutOfRange {
+                what: "position",
+                value: target.0,
+                limits: self.config.limits,
+            });
+        }
+        if !self.lens_ready || self.lens.is_none() {
+            return Err(Refusal::NoLens);
+        }
+        let motion = self.start_motion(target, self.config.max_speed, now, actions);
+        self.outcome = FocusState::Idle;
+        self.enter(State::Moving(motion), now);
+        Ok(Accepted::Done)
+    }
+
+    fn abort(&mut self, now: HostMicros, actions: &mut Vec<Action>) {
+        if self.state == State::Idle {
+            return;
+        }
+        actions.push(Action::StopLens);
+        if self.run.is_some() {
+            self.finish(Outcome::Aborted, now, actions);
+        } else {
+            self.enter(State::Idle, now);
+        }
+    }
+
+    /// Takes an input. The event path ([`Input::Batch`]) allocates nothing.
+    pub fn handle(&mut self, input: Input<'_>, now: HostMicros, actions: &mut Vec<Action>) {
+        match input {
+            Input::Batch(batch) => self.on_batch(batch, now, actions),
+            Input::Lens(sample) => self.on_lens(sample, now, actions),
+            Input::CameraFailed(failure) => {
+                self.camera_ready = false;
+                self.on_failure(
+                    match failure {
+                        DeviceFailure::Gone => Failure::CameraLost,
+                        DeviceFailure::Fault => Failure::CameraFault,
+                        DeviceFailure::Silent => Failure::CameraSilent,
+                    },
+                    now,
+                    actions,
+                );
+            }
+            Input::CameraReady => {
+                self.camera_ready = true;
+                self.camera_heard = now;
+                // It may count from zero again.
+                self.clock = ClockMap::new(None);
+            }
+            Input::LensFailed(failure) => {
+                self.lens_ready = false;
+                self.lens = None;
+                self.homed = !self.config.needs_homing;
+                self.on_failure(
+                    match failure {
+                        DeviceFailure::Gone => Failure::LensLost,
+                        DeviceFailure::Fault => Failure::LensFault,
+                        DeviceFailure::Silent => Failure::LensSilent,
+                    },
+                    now,
+                    actions,
+                );
+            }
+            Input::LensReady => {
+                self.lens_ready = true;
+                self.lens_heard = now;
+            }
+            Input::Tick => {}
+        }
+        self.watch_time(now, actions);
+    }
+
+    fn on_batch(&mut self, batch: &EventBatch, now: HostMicros, actions: &mut Vec<Action>) {
+        self.events += batch.events.len() as u64;
+        self.lost += batch.lost;
+        let Some(reached) = batch.reached.or(batch.events.last().map(|event| event.t)) else {
+            return;
+        };
+        self.camera_heard = now;
+        let clock_event = self.clock.observe(reached, batch.arrival);
+        match self.state {
+            State::Resting { .. } => self.sweep.observe_rest(&batch.events),
+            State::Sweeping { .. } | State::Draining { .. } => {
+                if clock_event == ClockEvent::Reset {
+                    self.fail(Failure::ClockUnusable, now, actions);
+                } else {
+                    self.sweep.feed(batch, reached);
+                    self.sweep.extend_live_curve(&self.clock, reached);
+                }
+            }
+            State::Idle
+            | State::Moving(_)
+            | State::Homing { .. }
+            | State::ToStart(_)
+            | State::Approaching { .. }
+            | State::Verifying { .. }
+            | State::Restoring { .. } => {}
+        }
+    }
+
+    fn on_lens(&mut self, sample: LensSample, now: HostMicros, actions: &mut Vec<Action>) {
+        self.lens = Some(sample);
+        self.lens_heard = now;
+        match self.state {
+            State::Idle | State::Resting { .. } | State::Verifying { .. } => {}
+            State::Draining { .. } => self.sweep.add_lens(&sample),
+            State::Moving(mut motion) => match motion.observe(&sample, now) {
+                Progress::UnderWay => self.state = State::Moving(motion),
+                Progress::Arrived => self.enter(State::Idle, now),
+                Progress::Failed(_) | Progress::Overdue => self.give_up_motion(now, actions),
+            },
+            State::Homing { since, seen_moving } => {
+                if sample.moving {
+                    self.state = State::Homing { since, seen_moving: true };
+                } else if seen_moving || now.since(since) >= HOMING_BEGINS {
+                    self.homed = true;
+                    self.go_to_start(now, actions);
+                }
+            }
+            State::ToStart(mut motion) => match motion.observe(&sample, now) {
+                Progress::UnderWay => self.state = State::ToStart(motion),
+                Progress::Arrived => {
+                    self.sweep.begin_rest();
+                    self.enter(State::Resting { since: now }, now);
+                }
+                Progress::Failed(failure) => self.fail(failure, now, actions),
+                Progress::Overdue => self.fail(Failure::TimedOut(Phase::ToStart), now, actions),
+            },
+            State::Sweeping { leg, mut motion } => {
+                self.sweep.add_lens(&sample);
+                match motion.observe(&sample, now) {
+                    Progress::UnderWay => self.state = State::Sweeping { leg, motion },
+                    Progress::Arrived => self.drain(leg, &sample, now, actions),
+                    Progress::Failed(failure) => self.fail(failure, now, actions),
+                    Progress::Overdue => {
+                        let phase = if leg == 0 { Phase::Sweeping } else { Phase::Returning };
+                        self.fail(Failure::TimedOut(phase), now, actions);
+                    }
+                }
+            }
+            State::Approaching { mut motion, answer, attempt, run_up } => {
+                match motion.observe(&sample, now) {
+                    Progress::UnderWay => self.state = State::Approaching { motion, answer, attempt, run_up },
+                    Progress::Arrived if run_up => self.approach_finally(answer, attempt, now, actions),
+                    Progress::Arrived => self.enter(State::Verifying { since: now, answer, attempt }, now),
+                    Progress::Failed(failure) => self.fail(failure, now, actions),
+                    Progress::Overdue => self.fail(Failure::TimedOut(Phase::Approaching), now, actions),
+                }
+            }
+            State::Restoring { mut motion, failure } => match motion.observe(&sample, now) {
+                Progress::UnderWay => self.state = State::Restoring { motion, failure },
+                Progress::Arrived => self.finish(Outcome::Failed(failure), now, actions),
+                Progress::Failed(_) | Progress::Overdue => {
+                    actions.push(Action::StopLens);
+                    self.finish(Outcome::Failed(failure), now, actions);
+                }
+            },
+        }
+    }
+
+    /// What time alone brings about: rests that end, silences, deadlines.
+    fn watch_time(&mut self, now: HostMicros, actions: &mut Vec<Action>) {
+        let (since, events) = self.rate_window;
+        if now.since(since) >= RATE_WINDOW {
+            self.event_rate = EventRate((self.events - events) as f64 / now.since(since).as_secs_f64());
+            self.rate_window = (now, self.events);
+        }
+        if self.state == State::Idle {
+            return;
+        }
+        if now.since(self.lens_heard) >= self.config.silence_timeout {
+            self.lens_ready = false;
+            self.on_failure(Failure::LensSilent, now, actions);
+            return;
+        }
+        if self.run.is_some() && now.since(self.camera_heard) >= self.config.silence_timeout {
+            self.fail(Failure::CameraSilent, now, actions);
+            return;
+        }
+        match self.state {
+            State::Resting { since } if now.since(since) >= self.config.rest => {
+                self.sweep.end_rest(now.since(since));
+                self.begin_sweep(0, now, actions);
+            }
+            State::Verifying { since, answer, attempt } if now.since(since) >= self.config.rest => {
+                self.verify(answer, attempt, now, actions);
+            }
+            State::Homing { since, .. } if now.since(since) >= self.config.homing_timeout => {
+                self.fail(Failure::TimedOut(Phase::Homing), now, actions);
+            }
+            State::Draining { leg, deadline } => {
+                if self.sweep.is_complete(&self.clock) {
+                    self.search(leg, now, actions);
+                } else if now >= deadline {
+                    self.fail(Failure::TimedOut(Phase::Searching), now, actions);
+                }
+            }
+            State::Sweeping { .. } if self.sweep.is_too_long(now) => {
+                self.fail(Failure::SweepTooLong, now, actions);
+            }
+            State::Moving(motion) if motion.is_overdue(now) => self.give_up_motion(now, actions),
+            State::Idle
+            | State::Moving(_)
+            | State::Homing { .. }
+            | State::ToStart(_)
+            | State::Resting { .. }
+            | State::Sweeping { .. }
+            | State::Approaching { .. }
+            | State::Verifying { .. }
+            | State::Restoring { .. } => {}
+        }
+    }
+}

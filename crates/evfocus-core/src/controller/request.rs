@@ -1,0 +1,146 @@
+//! What callers may ask of the controller, and what they are answered.
+
+use core::time::Duration;
+
+use super::ControllerConfig;
+use crate::report::{Directions, FocusPlan, RunId};
+use crate::search::Method;
+use crate::units::{LensPosition, LensRange, LensSpeed};
+
+/// Who decides that the lens moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// The caller moves the lens; focus runs are refused.
+    Manual,
+    /// The lens focuses when triggered, and never moves without a trigger.
+    Auto,
+}
+
+/// A focus run, as far as the caller cares; the configuration decides the rest.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FocusRequest {
+    /// Measure and search.
+    pub method: Option<Method>,
+    /// Accumulation interval of [`Method::ErFixed`].
+    pub interval: Option<Duration>,
+    /// Positions to sweep, within the limits.
+    pub range: Option<LensRange>,
+    /// Speed of the sweep.
+    pub speed: Option<LensSpeed>,
+    /// One way or both.
+    pub directions: Option<Directions>,
+}
+
+/// Something the controller is told to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// Start a focus run.
+    Focus(FocusRequest),
+    /// Stop whatever is under way; the lens stays where it is then.
+    Abort,
+    /// Move the lens.
+    MoveTo(LensPosition),
+    /// Change the mode; a change ends a run under way.
+    SetMode(Mode),
+}
+
+/// A command that was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Accepted {
+    /// A run began.
+    Started(RunId),
+    /// The same run is already under way.
+    UnderWay(RunId),
+    /// Done, or begun.
+    Done,
+}
+
+/// A command that was not taken; nothing changed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// Another run is under way.
+    #[error("run {run} is under way; wait for it or abort it")]
+    Busy {
+        /// That run.
+        run: RunId,
+    },
+    /// A focus run was asked for in manual mode.
+    #[error("focus runs need mode auto; the mode is manual")]
+    ManualMode,
+    /// There is no camera.
+    #[error("no camera is connected")]
+    NoCamera,
+    /// There is no lens.
+    #[error("no lens is connected")]
+    NoLens,
+    /// A position outside of the limits.
+    #[error("{what} {value} lies outside of the lens's limits, {limits}")]
+    OutOfRange {
+        /// What the number is.
+        what: &'static str,
+        /// The number, lens counts.
+        value: f64,
+        /// The limits.
+        limits: LensRange,
+    },
+    /// A speed that the lens cannot go.
+    #[error("a speed of {value} counts/s is more than the lens's {max} counts/s")]
+    TooFast {
+        /// The speed, counts per second.
+        value: f64,
+        /// The lens's limit, counts per second.
+        max: f64,
+    },
+    /// The sweep would take longer than counts are kept for.
+    #[error(
+        "a sweep of {sweep_s:.1} s is longer than the {longest_s:.1} s that counts are kept for; sweep faster or a shorter range"
+    )]
+    SweepTooLong {
+        /// The sweep, seconds.
+        sweep_s: f64,
+        /// What is kept, seconds.
+        longest_s: f64,
+    },
+    /// An accumulation interval that does not fit the sweep.
+    #[error("an interval of {interval_s} s must be above zero and shorter than the sweep's {sweep_s:.3} s")]
+    Interval {
+        /// The interval, seconds.
+        interval_s: f64,
+        /// The sweep, seconds.
+        sweep_s: f64,
+    },
+}
+
+impl FocusRequest {
+    /// The run that this request means under `config`.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a value does not suit the lens or the room for counts.
+    pub fn resolve(&self, config: &ControllerConfig) -> Result<FocusPlan, Refusal> {
+        let plan = FocusPlan {
+            method: self.method.unwrap_or(config.method),
+            interval: self.interval.unwrap_or(config.interval),
+            range: self.range.unwrap_or(config.limits),
+            speed: self.speed.unwrap_or(config.sweep_speed),
+            directions: self.directions.unwrap_or(config.directions),
+        };
+        for (what, end) in [("range start", plan.range.min()), ("range end", plan.range.max())] {
+            if !config.limits.contains(end) {
+                return Err(Refusal::OutOfRange { what, value: end.0, limits: config.limits });
+            }
+        }
+        let (speed, max) = (plan.speed.counts_per_second(), config.max_speed.counts_per_second());
+        if speed > max {
+            return Err(Refusal::TooFast { value: speed, max });
+        }
+        let (sweep_s, longest_s) = (plan.range.length() / speed, config.capacity.longest.as_secs_f64());
+        if sweep_s > longest_s {
+            return Err(Refusal::SweepTooLong { sweep_s, longest_s });
+        }
+        let interval_s = plan.interval.as_secs_f64();
+        if plan.method == Method::ErFixed && (interval_s <= 0.0 || interval_s >= sweep_s) {
+            return Err(Refusal::Interval { interval_s, sweep_s });
+        }
+        Ok(plan)
+    }
+}

@@ -1,0 +1,165 @@
+//! What the controller gathers during a sweep, and the search in it.
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use super::ControllerConfig;
+use crate::analysis::Analyzer;
+use crate::clock_map::ClockMap;
+use crate::curve::CurvePoint;
+use crate::event::{Event, EventBatch, Geometry};
+use crate::hot_pixels::HotPixels;
+use crate::lens_trace::{LensSample, LensTrace};
+use crate::measure::event_rate;
+use crate::report::{Failure, FocusPlan, LegReport};
+use crate::sweep::SweepRecorder;
+use crate::units::{CameraMicros, HostMicros};
+
+/// Camera time from one point of the live curve to the next, microseconds: what an eye can follow.
+const LIVE_STEP_US: i64 = 20_000;
+/// Points of the live curve: a sweep of 80 s.
+const LIVE_POINTS: usize = 4_000;
+#[derive(Debug)]
+pub(super) struct SweepState {
+    recorder: SweepRecorder,
+    analyzer: Analyzer,
+    hot_pixels: HotPixels,
+    host_trace: LensTrace<HostMicros>,
+    camera_trace: LensTrace<CameraMicros>,
+    began: HostMicros,
+    longest: Duration,
+    origin: CameraMicros,
+    end: Option<CameraMicros>,
+    lost: u64,
+    live_curve: Vec<CurvePoint>,
+    live_until: CameraMicros,
+}
+
+impl SweepState {
+    pub(super) fn new(geometry: Geometry, config: &ControllerConfig) -> Self {
+        Self {
+            recorder: SweepRecorder::new(geometry, config.capacity),
+            analyzer: Analyzer::new(geometry),
+            hot_pixels: HotPixels::new(geometry),
+            host_trace: LensTrace::with_capacity(config.lens_samples),
+            camera_trace: LensTrace::with_capacity(config.lens_samples),
+            began: HostMicros(0),
+            longest: config.capacity.longest,
+            origin: CameraMicros(0),
+            end: None,
+            lost: 0,
+            live_curve: Vec::with_capacity(LIVE_POINTS),
+            live_until: CameraMicros(0),
+        }
+    }
+
+    /// Forgets the run before.
+    pub(super) fn forget(&mut self) {
+        self.live_curve.clear();
+        self.hot_pixels.restart();
+    }
+
+    pub(super) fn begin_rest(&mut self) {
+        self.hot_pixels.restart();
+    }
+
+    pub(super) fn observe_rest(&mut self, events: &[Event]) {
+        self.hot_pixels.observe(events);
+    }
+
+    pub(super) fn end_rest(&mut self, duration: Duration) {
+        self.hot_pixels.learn(duration);
+    }
+
+    pub(super) fn hot_pixels(&self) -> usize {
+        self.hot_pixels.number()
+    }
+
+    /// Begins to count at `origin`; `sample` is the lens at rest where the sweep starts.
+    pub(super) fn begin(&mut self, origin: CameraMicros, sample: &LensSample, now: HostMicros) {
+        self.recorder.start(origin);
+        self.host_trace.clear();
+        self.began = now;
+        self.origin = origin;
+        self.end = None;
+        self.lost = 0;
+        self.live_curve.clear();
+        self.live_until = origin;
+        self.add_lens(sample);
+    }
+
+    /// No events after `end` belong to the sweep.
+    pub(super) fn end(&mut self, end: CameraMicros) {
+        self.end = Some(end);
+    }
+
+    /// Whether all events up to the end are counted.
+    pub(super) fn is_complete(&self, clock: &ClockMap) -> bool {
+        matches!((self.end, clock.newest()), (Some(end), Some(newest)) if newest >= end)
+    }
+
+    pub(super) fn is_too_long(&self, now: HostMicros) -> bool {
+        now.since(self.began) > self.longest
+    }
+
+    pub(super) fn add_lens(&mut self, sample: &LensSample) {
+        self.host_trace.push_if_later(sample.time(), sample.position);
+    }
+
+    /// Counts what belongs to the sweep: events since its origin, before its end, of pixels that are not hot.
+    pub(super) fn feed(&mut self, batch: &EventBatch, reached: CameraMicros) {
+        let events = batch.events.as_slice();
+        let from = events.partition_point(|event| event.t < self.origin);
+        let to = self.end.map_or(events.len(), |end| events.partition_point(|event| event.t < end));
+        let hot_pixels = &self.hot_pixels;
+        for run in events.get(from..to).unwrap_or_default().split(|event| hot_pixels.is_hot(event)) {
+            self.recorder.feed(run);
+        }
+        self.recorder.advance_to(reached);
+        self.lost += batch.lost;
+    }
+
+    pub(super) fn live_curve(&self) -> &[CurvePoint] {
+        &self.live_curve
+    }
+
+    /// Adds a point to the live curve for every whole step that has been counted.
+    pub(super) fn extend_live_curve(&mut self, clock: &ClockMap, reached: CameraMicros) {
+        while reached.micros_since(self.live_until) >= LIVE_STEP_US && self.live_curve.len() < LIVE_POINTS {
+            let (from, to) = (self.live_until.0, self.live_until.0 + LIVE_STEP_US);
+            self.live_until = CameraMicros(to);
+            let middle = CameraMicros(i64::midpoint(from, to));
+            let position =
+                clock.to_host(middle).ok().and_then(|host| self.host_trace.position_near(host.0 as f64));
+            let rate = event_rate(self.recorder.counter(), from as f64, to as f64);
+            if let (Some(position), Ok(rate)) = (position, rate) {
+                self.live_curve.push(CurvePoint { t_us: middle.0 as f64, position, rate });
+            }
+        }
+    }
+
+    /// Searches the sweep and writes what was found into `report`.
+    pub(super) fn search(
+        &mut self,
+        plan: &FocusPlan,
+        config: &ControllerConfig,
+        clock: &ClockMap,
+        report: &mut LegReport,
+    ) -> Result<(), Failure> {
+        self.camera_trace.clear();
+        for (host, position) in self.host_trace.samples() {
+            if let Ok(camera) = clock.to_camera(host) {
+                self.camera_trace.push_if_later(camera, position);
+            }
+        }
+        report.lost = self.lost;
+        self.analyzer.analyze(
+            &self.recorder,
+            &self.camera_trace,
+            plan.method,
+            plan.interval,
+            config.sweep_limits,
+            report,
+        )
+    }
+}

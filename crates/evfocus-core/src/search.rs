@@ -1,0 +1,155 @@
+//! Searches for the sharpest moment of a sweep.
+
+mod egs;
+mod egs_official;
+mod er_fixed;
+
+use core::fmt;
+use core::str::FromStr;
+use core::time::Duration;
+
+use crate::counter::CounterError;
+use crate::event::Geometry;
+use crate::lens_trace::LensTraceError;
+use crate::measure::PixelCounts;
+use crate::sweep::Sweep;
+use crate::units::LensPosition;
+
+pub use egs::{Comparison, GOLDEN_RATIO, MAX_ITERATIONS, STOP_INTERVAL_US, golden_search};
+
+/// A focus measure together with the search that looks for its maximum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Golden search on the event rate: the paper's Algorithm 2, with its offsets corrected.
+    Egs,
+    /// What the code that the paper's authors published does, step by step.
+    EgsOfficial,
+    /// The highest event rate at a fixed accumulation interval: the paper's Algorithm 1.
+    ErFixed,
+    /// Golden search on the sum of the squared event rates of the pixels: the paper's F_ev to the letter.
+    ErSquared,
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: [Self; 4] = [Self::Egs, Self::EgsOfficial, Self::ErFixed, Self::ErSquared];
+
+    /// The name users know it by.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Egs => "egs",
+            Self::EgsOfficial => "egs-official",
+            Self::ErFixed => "er-fixed",
+            Self::ErSquared => "er-squared",
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A method name that is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no such method; use one of egs, egs-official, er-fixed, er-squared")]
+pub struct UnknownMethod;
+
+impl FromStr for Method {
+    type Err = UnknownMethod;
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        Self::ALL.into_iter().find(|method| method.name() == name).ok_or(UnknownMethod)
+    }
+}
+
+/// What a search found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The lens position of the answer.
+    pub position: LensPosition,
+    /// Its time on the camera's clock, microseconds.
+    pub t_us: f64,
+    /// Comparisons (golden searches) or windows (fixed interval) made.
+    pub iterations: u32,
+    /// Length of the last accumulation interval, microseconds.
+    pub interval_us: f64,
+}
+
+/// Why a search has no answer.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// All events have the same time.
+    #[error("the sweep has no length: all of its events are at {at_us} us")]
+    NoLength {
+        /// That time, microseconds.
+        at_us: i64,
+    },
+    /// The fixed interval is longer than the sweep.
+    #[error(
+        "an accumulation interval of {interval_us} us does not fit a sweep of {sweep_us} us; use a shorter one"
+    )]
+    IntervalTooLong {
+        /// Interval, microseconds.
+        interval_us: f64,
+        /// Sweep, microseconds.
+        sweep_us: f64,
+    },
+    /// The method needs every event, and there was not room for all.
+    #[error(
+        "{not_kept} of the sweep's events did not fit the event buffer, and this method needs every one; enlarge the buffer or use egs"
+    )]
+    EventsNotKept {
+        /// Events beyond the buffer.
+        not_kept: u64,
+    },
+    /// The counter does not cover the sweep.
+    #[error(transparent)]
+    Counter(#[from] CounterError),
+    /// The lens trace does not cover the answer.
+    #[error(transparent)]
+    Trace(#[from] LensTraceError),
+}
+
+/// What a search needs beside the sweep; allocated once.
+#[derive(Debug, Clone)]
+pub struct Searcher {
+    pixel_counts: PixelCounts,
+}
+
+impl Searcher {
+    /// A searcher for sweeps of sensors of `geometry`.
+    pub fn new(geometry: Geometry) -> Self {
+        Self { pixel_counts: PixelCounts::new(geometry) }
+    }
+
+    /// Looks for the sharpest moment of `sweep`. `interval` is the accumulation interval of [`Method::ErFixed`] (the paper
+    /// uses 55 and 65 ms); the other methods find their own. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`SearchError`], naming what the sweep lacks.
+    pub fn search(
+        &mut self,
+        method: Method,
+        sweep: &Sweep<'_>,
+        interval: Duration,
+    ) -> Result<Estimate, SearchError> {
+        if sweep.end <= sweep.start {
+            return Err(SearchError::NoLength { at_us: sweep.start.0 });
+        }
+        match method {
+            Method::Egs => egs::search(sweep),
+            Method::ErSquared => egs::search_squared(sweep, &mut self.pixel_counts),
+            Method::EgsOfficial => egs_official::search(sweep),
+            Method::ErFixed => er_fixed::search(sweep, interval),
+        }
+    }
+}
+
+fn all_events_kept(sweep: &Sweep<'_>) -> Result<(), SearchError> {
+    if sweep.store.is_complete() {
+        Ok(())
+    } else {
+        Err(SearchError::EventsNotKept { not_kept: sweep.store.not_kept() })
+    }
+}

@@ -1,0 +1,130 @@
+//! What a sweep leaves behind, and the recorder that gathers it: the same for a live run and for a recording.
+
+use core::time::Duration;
+
+use crate::counter::CumulativeCounter;
+use crate::event::{Event, Geometry};
+use crate::event_store::EventStore;
+use crate::lens_trace::LensTrace;
+use crate::units::CameraMicros;
+
+/// How much a sweep may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SweepCapacity {
+    /// Width of the counter's bins.
+    pub bin: Duration,
+    /// The longest sweep.
+    pub longest: Duration,
+    /// Events kept for the measures that need pixels or exact times, 8 bytes each; further ones are counted only.
+    pub events: usize,
+}
+
+impl Default for SweepCapacity {
+    fn default() -> Self {
+        Self { bin: CumulativeCounter::DEFAULT_BIN, longest: Duration::from_secs(20), events: 16_000_000 }
+    }
+}
+
+/// Gathers the events of one sweep.
+#[derive(Debug, Clone)]
+pub struct SweepRecorder {
+    geometry: Geometry,
+    counter: CumulativeCounter,
+    store: EventStore,
+    span: Option<(CameraMicros, CameraMicros)>,
+}
+
+impl SweepRecorder {
+    /// A recorder for sensors of `geometry`. All memory is allocated here.
+    pub fn new(geometry: Geometry, capacity: SweepCapacity) -> Self {
+        Self {
+            geometry,
+            counter: CumulativeCounter::new(capacity.bin, capacity.longest),
+            store: EventStore::with_capacity(capacity.events),
+            span: None,
+        }
+    }
+
+    /// Begins a new sweep at `origin`.
+    pub fn start(&mut self, origin: CameraMicros) {
+        self.counter.start(origin);
+        self.store.start(origin);
+        self.span = None;
+    }
+
+    /// Takes the events of a batch, in the order of their times.
+    pub fn feed(&mut self, events: &[Event]) {
+        let (Some(first), Some(last)) = (events.first(), events.last()) else { return };
+        self.span = Some((self.span.map_or(first.t, |(start, _)| start), last.t));
+        self.counter.count(events);
+        for event in events {
+            self.store.push(event);
+        }
+    }
+
+    /// Notes that there are no further events before `time`.
+    pub fn advance_to(&mut self, time: CameraMicros) {
+        self.counter.advance_to(time);
+    }
+
+    /// The sensor's size.
+    pub fn geometry(&self) -> Geometry {
+        self.geometry
+    }
+
+    /// The running totals.
+    pub fn counter(&self) -> &CumulativeCounter {
+        &self.counter
+    }
+
+    /// The events kept.
+    pub fn store(&self) -> &EventStore {
+        &self.store
+    }
+
+    /// First and last event fed since the start.
+    pub fn span(&self) -> Option<(CameraMicros, CameraMicros)> {
+        self.span
+    }
+
+    /// The sweep as it stands: its events with the lens positions of `trace`, from the first event to the last one, as far as
+    /// the trace reaches. `None` before the first event, and if the trace lies elsewhere.
+    pub fn sweep<'a>(&'a self, trace: &'a LensTrace<CameraMicros>) -> Option<Sweep<'a>> {
+        let ((first, last), (trace_first, trace_last)) = (self.span?, (trace.first()?.0, trace.last()?.0));
+        let (start, end) = (first.max(trace_first), last.min(trace_last));
+        if start > end {
+            return None;
+        }
+        Some(Sweep { geometry: self.geometry, start, end, counter: &self.counter, store: &self.store, trace })
+    }
+}
+
+/// One sweep: what happened, and where the lens was meanwhile.
+#[derive(Debug, Clone, Copy)]
+pub struct Sweep<'a> {
+    /// The sensor's size.
+    pub geometry: Geometry,
+    /// Time of the first event; the range that the searches start from.
+    pub start: CameraMicros,
+    /// Time of the last event.
+    pub end: CameraMicros,
+    /// Running totals over at least `start` to `end`.
+    pub counter: &'a CumulativeCounter,
+    /// The events, as far as there was room.
+    pub store: &'a EventStore,
+    /// Lens positions in camera time.
+    pub trace: &'a LensTrace<CameraMicros>,
+}
+
+impl Sweep<'_> {
+    /// Length of the range in microseconds.
+    pub fn length_us(&self) -> f64 {
+        self.end.micros_since(self.start) as f64
+    }
+
+    /// Events in the range.
+    pub fn events(&self) -> u64 {
+        let (on, off) = self.counter.totals();
+        on + off
+    }
+}
