@@ -1,1 +1,30 @@
-//! Placeholder.
+//! Recordings of event cameras: reading, writing, summing up.
+//!
+//! [`Recording::open`] recognises a file by its content and hands out its events batch by batch; a summary counts a whole
+//! file in one pass; [`Evt3Writer`] and its siblings write files that the tools of the field read; [`positions`] reads and
+//! writes where the lens was meanwhile. The decoders in [`decode`] are pure functions of bytes and serve live cameras too.
+//!
+//! Not its job: judging whether a recording is good enough to focus with, opening devices, decompressing archives.
+//!
+//! # Memory
+//! A reader holds one buffer of [`READ_BYTES`] whatever the
+//! size of the file, and appends at most [`MAX_EVENTS_PER_READ`] events to the batch it is lent.
+
+pub mod decode;
+pub mod encode;
+pub mod positions;
+
+mod damage;
+mod error;
+mod format;
+mod raw_header;
+mod raw_writer;
+mod recording;
+mod sniff;
+mod words;
+
+pub use damage::Damage;
+pub use error::RecordError;
+pub use format::{Format, UnknownFormat};
+pub use raw_writer::Evt3Writer;
+pub use recording::{MAX_EVENTS_PER_READ, READ_BYTES, Recording};

@@ -1,0 +1,46 @@
+//! What was found wrong with a stream of events.
+
+/// Counters of everything that a decoder or reader found amiss; all zero for a sound recording.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Damage {
+    /// Events before the first word that tells the time; a recording cut from the middle of a stream begins with some.
+    pub events_before_time: u64,
+    /// Events before the first row, column or vector base that they need.
+    pub events_before_address: u64,
+    /// Events (or rows of the DAVIS346) with a coordinate that the sensor does not have.
+    pub outside_sensor: u64,
+    /// Steps of the camera's time that are neither 0 nor 1 of its coarse unit: data was lost there.
+    pub time_jumps: u64,
+    /// Events that are earlier than the event before them.
+    pub time_reversals: u64,
+    /// Resets of the camera's clock in mid-stream; time starts again from zero.
+    pub timestamp_resets: u64,
+    /// Words of a kind that the format does not define.
+    pub unknown_words: u64,
+    /// Packets whose content could not be decoded and was skipped.
+    pub bad_packets: u64,
+    /// Bytes of an incomplete word or packet at the end.
+    pub trailing_bytes: u64,
+}
+
+impl Damage {
+    /// All counters with their names, in the order of the fields.
+    pub fn counters(&self) -> [(&'static str, u64); 9] {
+        [
+            ("events_before_time", self.events_before_time),
+            ("events_before_address", self.events_before_address),
+            ("outside_sensor", self.outside_sensor),
+            ("time_jumps", self.time_jumps),
+            ("time_reversals", self.time_reversals),
+            ("timestamp_resets", self.timestamp_resets),
+            ("unknown_words", self.unknown_words),
+            ("bad_packets", self.bad_packets),
+            ("trailing_bytes", self.trailing_bytes),
+        ]
+    }
+
+    /// Whether nothing was found wrong.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}

@@ -1,0 +1,209 @@
+//! The 16-bit words of a DAVIS346's USB stream, little-endian (iniVation's logic for the FX3 boards; rules as in libcaer's
+//! `davis_common`): bit 15 marks a time, else bits 14 to 12 say what bits 11 to 0 are.
+
+use evfocus_core::{CameraMicros, Event, EventBatch, Geometry, Polarity};
+
+use super::framing::Framing;
+use crate::Damage;
+
+/// One word, taken apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Word {
+    /// Low 15 bits of the microsecond counter.
+    Time(u16),
+    /// A signal without an address.
+    Special(u16),
+    /// Row register, for the DAVIS346 the column of the picture: its axes are exchanged.
+    Row(u16),
+    /// Column register, for the DAVIS346 the row of the picture, with the polarity.
+    Column(u16, Polarity),
+    /// Samples of the frame converter, of the inertial unit, of the exposure.
+    NoEvents,
+    /// So many times 2^15 us have passed since the last wrap.
+    Wrap(u16),
+}
+
+/// The special words that matter here; the others belong to frames and the inertial unit.
+mod special {
+    pub(super) const RESERVED: u16 = 0;
+    pub(super) const TIMESTAMP_RESET: u16 = 1;
+    pub(super) const EXTERNAL_FALLING: u16 = 2;
+    pub(super) const EXTERNAL_PULSE: u16 = 4;
+    pub(super) const LAST: u16 = 17;
+}
+
+impl Word {
+    fn of(word: u16) -> Self {
+        if word & 0x8000 != 0 {
+            return Self::Time(word & 0x7FFF);
+        }
+        let data = word & 0x0FFF;
+        match word >> 12 {
+            0 => Self::Special(data),
+            1 => Self::Row(data),
+            2 => Self::Column(data, Polarity::Off),
+            3 => Self::Column(data, Polarity::On),
+            7 => Self::Wrap(data),
+            _ => Self::NoEvents,
+        }
+    }
+}
+
+/// Microseconds until the 15 bits of time wrap.
+const TIME_PERIOD_US: i64 = 1 << 15;
+
+/// Decodes the words of a DAVIS346 into events; frames and inertial data are passed over.
+///
+/// Times count from the camera's last timestamp reset. A reset in mid-stream starts them from zero again, as the camera
+/// does, and is counted.
+#[derive(Debug, Clone)]
+pub struct DavisWordDecoder {
+    framing: Framing<2>,
+    state: State,
+}
+
+#[derive(Debug, Clone)]
+struct State {
+    wraps_us: i64,
+    time: i64,
+    /// Whether any word has told the time.
+    time_known: bool,
+    /// Picture column of the events that follow.
+    column: Option<u16>,
+    triggers: u64,
+    damage: Damage,
+}
+
+impl DavisWordDecoder {
+    /// The sensor of the DAVIS346.
+    pub const GEOMETRY: Geometry = Geometry { width: 346, height: 260 };
+
+    /// A decoder at the start of a stream.
+    pub fn new() -> Self {
+        let state = State {
+            wraps_us: 0,
+            time: 0,
+            time_known: false,
+            column: None,
+            triggers: 0,
+            damage: Damage::default(),
+        };
+        Self { framing: Framing::new(), state }
+    }
+
+    /// Appends the events in `bytes` to the batch and sets [`EventBatch::reached`]; at most one event per word.
+    pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
+        let state = &mut self.state;
+        let dropped = state.damage.events_before_address + state.damage.outside_sensor;
+        self.framing.feed(bytes, |word| state.word(u16::from_le_bytes(word), &mut batch.events));
+        batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
+        batch.reached = state.time_known.then_some(CameraMicros(state.time)).or(batch.reached);
+    }
+
+    /// Says that the stream has ended, so that a partial word counts as damage.
+    pub fn finish(&mut self) {
+        self.state.damage.trailing_bytes += self.framing.finish();
+    }
+
+    /// What was found wrong so far.
+    pub fn damage(&self) -> Damage {
+        self.state.damage
+    }
+
+    /// Edges and pulses at the external input so far.
+    pub fn triggers(&self) -> u64 {
+        self.state.triggers
+    }
+}
+
+impl Default for DavisWordDecoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl State {
+    fn word(&mut self, word: u16, events: &mut Vec<Event>) {
+        match Word::of(word) {
+            Word::Time(low) => self.set_time(i64::from(low)),
+            Word::Row(row) => self.row(row),
+            Word::Column(column, polarity) => self.event(column, polarity, events),
+            Word::Special(signal) => self.special(signal),
+            Word::NoEvents => {}
+            Word::Wrap(times) => {
+                // More than one: the camera counted wraps while nobody read from it.
+                self.wraps_us = self.wraps_us.saturating_add(i64::from(times) * TIME_PERIOD_US);
+                self.damage.time_jumps += u64::from(times != 1);
+                self.set_time(0);
+            }
+        }
+    }
+
+    fn set_time(&mut self, low: i64) {
+        self.time = self.wraps_us.saturating_add(low);
+        self.time_known = true;
+    }
+
+    fn special(&mut self, signal: u16) {
+        match signal {
+            special::TIMESTAMP_RESET => {
+                // The reset at the start of a stream is how it begins, not damage.
+                self.damage.timestamp_resets += u64::from(self.time > 0);
+                self.wraps_us = 0;
+                self.set_time(0);
+            }
+            special::EXTERNAL_FALLING..=special::EXTERNAL_PULSE => self.triggers += 1,
+            special::RESERVED => self.damage.unknown_words += 1,
+            signal if signal > special::LAST => self.damage.unknown_words += 1,
+            _ => {}
+        }
+    }
+
+    fn row(&mut self, row: u16) {
+        if row < DavisWordDecoder::GEOMETRY.width {
+            self.column = Some(row);
+        } else {
+            // The events that follow belong to no column that exists; the column before would be a guess.
+            self.column = None;
+            self.damage.outside_sensor += 1;
+        }
+    }
+
+    fn event(&mut self, y: u16, polarity: Polarity, events: &mut Vec<Event>) {
+        let Some(x) = self.column else {
+            self.damage.events_before_address += 1;
+            return;
+        };
+        if !self.time_known {
+            self.damage.events_before_time += 1;
+        } else if y < DavisWordDecoder::GEOMETRY.height {
+            events.push(Event { t: CameraMicros(self.time), x, y, polarity });
+        } else {
+            self.damage.outside_sensor += 1;
+        }
+    }
+}
+
+/// Whether `bytes`, the start of a file, could be nothing but DAVIS346 words: every word is one that the camera sends, all
+/// addresses exist, time never goes back between wraps, and there are events. Chance passes this for no more than a few words.
+pub(crate) fn looks_like_davis_words(bytes: &[u8]) -> bool {
+    let mut last_time = 0;
+    let (mut times, mut events) = (0, 0);
+    for &word in bytes.as_chunks::<2>().0 {
+        match Word::of(u16::from_le_bytes(word)) {
+            Word::Time(time) if time < last_time => return false,
+            Word::Time(time) => {
+                last_time = time;
+                times += 1;
+            }
+            Word::Wrap(0) | Word::Special(special::RESERVED) => return false,
+            Word::Wrap(_) | Word::Special(special::TIMESTAMP_RESET) => last_time = 0,
+            Word::Special(signal) if signal > special::LAST => return false,
+            Word::Row(row) if row >= DavisWordDecoder::GEOMETRY.width => return false,
+            Word::Column(column, _) if column >= DavisWordDecoder::GEOMETRY.height => return false,
+            Word::Column(..) => events += 1,
+            Word::Row(_) | Word::Special(_) | Word::NoEvents => {}
+        }
+    }
+    times > 0 && events > 0
+}

@@ -1,0 +1,117 @@
+//! Where the lens was during a recording: a CSV file with the header `t_us,position`, one sample a line, oldest first, times
+//! on the clock of the recording's events.
+//!
+//! Not its job: judging whether the positions cover a recording or move at all.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use evfocus_core::{CameraMicros, LensPosition, LensTrace};
+
+use crate::RecordError;
+
+/// The first line of a positions file.
+pub const HEADER: &str = "t_us,position";
+/// Fewer samples say nothing about a motion.
+pub const MIN_SAMPLES: usize = 2;
+/// Larger files are no positions files: this is a day at one sample a millisecond.
+pub const MAX_BYTES: u64 = 2 << 30;
+
+/// Reads the positions at `path`. [`LensTrace::first`], [`LensTrace::last`] and [`LensTrace::extent`] tell what they cover.
+///
+/// # Errors
+/// [`RecordError::Open`] and [`RecordError::Read`] if the system refuses, [`RecordError::Line`] for a line that is not
+/// `time,position`, a number that is not finite, a time that is not after the one before, or a wrong header;
+/// [`RecordError::Unrecognised`] for a file that is empty or has fewer than [`MIN_SAMPLES`] samples.
+pub fn read(path: impl AsRef<Path>) -> Result<LensTrace<CameraMicros>, RecordError> {
+    let path = path.as_ref();
+    let open_error =
+        |source| RecordError::Open { path: path.to_owned(), source, remedy: "name the file of positions" };
+    let size = fs::metadata(path).map_err(open_error)?.len();
+    let unrecognised = |found: String| RecordError::Unrecognised {
+        path: path.to_owned(),
+        found,
+        remedy: format!(
+            "a positions file has the line {HEADER:?} and then at least {MIN_SAMPLES} lines such as 1000,220"
+        ),
+    };
+    if size > MAX_BYTES {
+        return Err(unrecognised(format!("{size} bytes are too many for a file of positions")));
+    }
+    let bytes = fs::read(path).map_err(|source| RecordError::Read { path: path.to_owned(), source })?;
+    let text = String::from_utf8_lossy(&bytes);
+    if text.trim().is_empty() {
+        return Err(unrecognised(String::from("the file is empty")));
+    }
+    let trace = parse(path, text.trim_start_matches('\u{feff}'))?;
+    if trace.len() < MIN_SAMPLES {
+        return Err(unrecognised(format!("only {} positions", trace.len())));
+    }
+    Ok(trace)
+}
+
+/// Writes the samples of `trace` to `path`, replacing the file.
+///
+/// # Errors
+/// [`RecordError::Write`] if the system refuses.
+pub fn write(path: impl AsRef<Path>, trace: &LensTrace<CameraMicros>) -> Result<(), RecordError> {
+    let mut text = format!("{HEADER}\n");
+    for (CameraMicros(time), LensPosition(position)) in trace.samples() {
+        // Writing to a string cannot fail; the shortest form that reads back as the same number.
+        let _infallible = writeln!(text, "{time},{position}");
+    }
+    let path = path.as_ref();
+    fs::write(path, text).map_err(|source| RecordError::Write { path: PathBuf::from(path), source })
+}
+
+const REMEDY: &str = "write the time in whole microseconds, a comma and the position in counts, oldest first";
+
+fn parse(path: &Path, text: &str) -> Result<LensTrace<CameraMicros>, RecordError> {
+    let mut trace = LensTrace::with_capacity(text.lines().count());
+    let mut header_seen = false;
+    for (index, line) in text.lines().enumerate() {
+        let error = |what: String, remedy| RecordError::Line {
+            path: path.to_owned(),
+            line: index as u64 + 1,
+            what,
+            text: line.chars().take(80).collect(),
+            remedy,
+        };
+        let trimmed = line.trim();
+        if trimmed.is_empty() {
+            continue;
+        }
+        if !header_seen {
+            header_seen = true;
+            if without_spaces(trimmed) != HEADER {
+                return Err(error(
+                    String::from("not the header of a positions file"),
+                    "the first line must be t_us,position",
+                ));
+            }
+            continue;
+        }
+        let (time, position) = sample(trimmed).map_err(|what| error(what, REMEDY))?;
+        trace.push(CameraMicros(time), LensPosition(position)).map_err(|reason| {
+            error(reason.to_string(), "sort the lines by time and leave one for each time")
+        })?;
+    }
+    Ok(trace)
+}
+
+fn sample(line: &str) -> Result<(i64, f64), String> {
+    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+    let &[time, position] = fields.as_slice() else {
+        return Err(format!("{} fields where there must be 2", fields.len()));
+    };
+    let time = time.parse().map_err(|_| format!("{time:?} is not a whole number of microseconds"))?;
+    match position.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok((time, value)),
+        _ => Err(format!("{position:?} is not a finite number")),
+    }
+}
+
+fn without_spaces(line: &str) -> String {
+    line.chars().filter(|c| !c.is_whitespace()).collect()
+}
