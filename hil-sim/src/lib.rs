@@ -1,1 +1,33 @@
-//! Placeholder.
+//! The simulated rig: a camera and a motorised lens before a scene, behind the same traits as real hardware.
+//!
+//! The physics is that of the project's notes on sensor and optics: logarithmic pixels with finite bandwidth, thresholds
+//! that differ, noise, leak and a limited read-out; thin-lens blur; a motor with backlash, ripple and stick-slip; shake,
+//! moving scenes, flicker; and faults on schedule. Everything follows from one seed.
+//!
+//! Not its job: knowing anything of the focus loop. What the simulator knows and a real rig does not tell
+//! ([`Rig::truth`]) never passes through the traits.
+
+mod camera;
+mod config;
+mod faults;
+mod fourier;
+mod lens;
+mod motion;
+mod names;
+mod optics;
+mod picture;
+mod random;
+mod rig;
+mod scene;
+mod sensor;
+
+pub use camera::SimCamera;
+pub use config::{ConfigError, Flicker, LinkConfig, RigConfig};
+pub use faults::{Fault, FaultKind, FaultTrigger};
+pub use lens::{LensConfig, SimLens};
+pub use motion::MotionConfig;
+pub use names::NameError;
+pub use optics::{OpticsConfig, PointSpread};
+pub use rig::Rig;
+pub use scene::Scene;
+pub use sensor::{CameraModel, Light, SensorConfig};

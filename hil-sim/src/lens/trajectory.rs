@@ -1,0 +1,231 @@
+//! Where motor and optics were at any time, from all the motions that were commanded.
+
+use std::collections::VecDeque;
+
+use super::config::LensConfig;
+use super::profile::{Limits, Phase, brake, travel};
+
+/// Motions that are kept: the sensor may lag behind the lens by this many commands.
+const MOTIONS_KEPT: usize = 4096;
+
+/// Motor and optics at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LensInstant {
+    /// What the lens's own encoder sees, counts.
+    pub(crate) motor: f64,
+    /// Where the glass is, counts: the motor plus what of the backlash is taken up the other way.
+    pub(crate) optics: f64,
+    /// Counts per second of the motor, before ripple and sticking.
+    pub(crate) velocity: f64,
+    /// Whether the motor's controller thinks that a motion is under way.
+    pub(crate) moving: bool,
+}
+
+/// One command and what the motor makes of it.
+#[derive(Debug, Clone)]
+struct Motion {
+    /// Seconds since the rig was made.
+    start: f64,
+    /// Where the motor stands before the first phase and after the last, and the optics with it.
+    from: LensInstant,
+    /// Each phase with the profile time and the optics position at its start.
+    phases: Vec<(f64, f64, Phase)>,
+    rest: LensInstant,
+    /// Seconds of profile time.
+    duration: f64,
+}
+
+/// What a motor is told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Command {
+    /// To `target` at up to `speed` counts per second.
+    Travel {
+        /// Counts.
+        target: f64,
+        /// Counts per second.
+        speed: f64,
+    },
+    /// Stop.
+    Brake,
+}
+
+/// All motions of a lens.
+#[derive(Debug, Clone)]
+pub(crate) struct Trajectory {
+    motions: VecDeque<Motion>,
+    acceleration: f64,
+    backlash: f64,
+    overshoot: f64,
+    bounds: (f64, f64),
+    warp: Warp,
+}
+
+impl Trajectory {
+    pub(crate) fn new(config: &LensConfig) -> Self {
+        let rest =
+            LensInstant { motor: config.start.0, optics: config.start.0, velocity: 0.0, moving: false };
+        let motions =
+            VecDeque::from([Motion { start: 0.0, from: rest, phases: Vec::new(), rest, duration: 0.0 }]);
+        Self {
+            motions,
+            acceleration: config.acceleration,
+            backlash: config.backlash,
+            overshoot: config.overshoot,
+            bounds: (config.range.min().0, config.range.max().0),
+            warp: Warp::new(config),
+        }
+    }
+
+    /// Motor and optics `seconds` after the rig was made.
+    pub(crate) fn at(&self, seconds: f64) -> LensInstant {
+        let index = self.motions.partition_point(|motion| motion.start <= seconds);
+        match self.motions.get(index.saturating_sub(1)) {
+            Some(motion) => motion.at(self.warp.profile_time(seconds - motion.start), self.backlash),
+            None => LensInstant { motor: self.bounds.0, optics: self.bounds.0, velocity: 0.0, moving: false },
+        }
+    }
+
+    /// Replaces the motion under way at `seconds`.
+    pub(crate) fn command(&mut self, seconds: f64, command: Command) {
+        let from = self.at(seconds);
+        let mut phases = Vec::new();
+        match command {
+            Command::Brake => {
+                brake(&mut phases, from.motor, from.velocity, self.acceleration);
+            }
+            Command::Travel { target, speed } => {
+                let limits = Limits { speed, acceleration: self.acceleration };
+                let beyond = (target + self.overshoot.copysign(target - from.motor))
+                    .clamp(self.bounds.0, self.bounds.1);
+                // A step shorter than the overshoot does not gather the speed that carries the motor too far.
+                if self.overshoot > 0.0 && (target - from.motor).abs() > self.overshoot {
+                    let turn = travel(&mut phases, from.motor, from.velocity, beyond, limits);
+                    travel(&mut phases, turn, 0.0, target, limits);
+                } else {
+                    travel(&mut phases, from.motor, from.velocity, target, limits);
+                }
+            }
+        }
+        if self.motions.len() == MOTIONS_KEPT {
+            self.motions.pop_front();
+        }
+        self.motions.push_back(Motion::new(seconds, from, phases, self.backlash));
+    }
+
+    /// Lets the lens have stood still from `since` to `until`, and stand there from then on.
+    pub(crate) fn hold(&mut self, since: f64, until: f64) {
+        let rest = LensInstant { velocity: 0.0, moving: false, ..self.at(since) };
+        self.motions.retain(|motion| motion.start < since);
+        for start in [since, until] {
+            self.motions.push_back(Motion { start, from: rest, phases: Vec::new(), rest, duration: 0.0 });
+        }
+    }
+
+    /// When the newest motion first brings the motor to `position`, in seconds since the rig was made.
+    pub(crate) fn passes(&self, position: f64) -> Option<f64> {
+        let motion = self.motions.back()?;
+        let profile_time = motion.phases.iter().find_map(|&(start, _, phase)| {
+            let (low, high) = (phase.position.min(phase.end()), phase.position.max(phase.end()));
+            (low <= position && position <= high).then(|| {
+                let rising = phase.end() >= phase.position;
+                let after = bisect(phase.duration, |t| (phase.position_after(t) >= position) == rising);
+                start + after
+            })
+        })?;
+        // Sticking at most stretches a motion by one of its periods, ripple by the mean slow-down.
+        let latest = self.warp.latest(profile_time);
+        Some(motion.start + bisect(latest, |t| self.warp.profile_time(t) >= profile_time))
+    }
+}
+
+/// The smallest time in 0 to `end` from which on `reached` holds, to well below a microsecond.
+fn bisect(end: f64, reached: impl Fn(f64) -> bool) -> f64 {
+    let (mut before, mut after) = (0.0, end);
+    for _ in 0..48 {
+        let middle = f64::midpoint(before, after);
+        if reached(middle) { after = middle } else { before = middle }
+    }
+    after
+}
+
+impl Motion {
+    fn new(start: f64, from: LensInstant, phases: Vec<Phase>, backlash: f64) -> Self {
+        let mut duration = 0.0;
+        let mut rest = LensInstant { velocity: 0.0, moving: false, ..from };
+        let phases = phases
+            .into_iter()
+            .map(|phase| {
+                let entry = (duration, rest.optics, phase);
+                duration += phase.duration;
+                rest.motor = phase.end();
+                rest.optics = play(rest.optics, rest.motor, backlash);
+                entry
+            })
+            .collect();
+        Self { start, from, phases, rest, duration }
+    }
+
+    fn at(&self, profile_time: f64, backlash: f64) -> LensInstant {
+        if profile_time >= self.duration {
+            return self.rest;
+        }
+        let index = self.phases.partition_point(|&(start, ..)| start <= profile_time);
+        let Some(&(start, optics, phase)) = self.phases.get(index.saturating_sub(1)) else {
+            return self.from;
+        };
+        let motor = phase.position_after(profile_time - start);
+        LensInstant {
+            motor,
+            optics: play(optics, motor, backlash),
+            velocity: phase.velocity_after(profile_time - start),
+            moving: true,
+        }
+    }
+}
+
+/// The optics position after the motor came to `motor` without turning round. Upwards the motor pushes the glass along;
+/// downwards the gap must close first.
+fn play(optics: f64, motor: f64, backlash: f64) -> f64 {
+    optics.clamp(motor, motor + backlash)
+}
+
+/// The unsteadiness of the motor, as a distortion of time: the way stays as planned, the schedule does not.
+#[derive(Debug, Clone, Copy)]
+struct Warp {
+    ripple: f64,
+    ripple_period: f64,
+    stick: f64,
+    stick_period: f64,
+}
+
+impl Warp {
+    fn new(config: &LensConfig) -> Self {
+        Self {
+            ripple: config.speed_ripple,
+            ripple_period: config.speed_ripple_period.as_secs_f64(),
+            stick: config.stick_slip,
+            stick_period: config.stick_slip_period.as_secs_f64(),
+        }
+    }
+
+    /// The time in the planned profile, `seconds` after the motion began; never ahead of it in the mean.
+    fn profile_time(&self, seconds: f64) -> f64 {
+        let mut time = seconds;
+        if self.stick > 0.0 {
+            let period = (time / self.stick_period).floor() * self.stick_period;
+            let slipping = (time - period - self.stick * self.stick_period).max(0.0);
+            time = period + slipping / (1.0 - self.stick);
+        }
+        if self.ripple > 0.0 {
+            // The speed goes between 1 and 1 - 2 ripple of the plan: slower than asked, never faster.
+            let omega = std::f64::consts::TAU / self.ripple_period;
+            time -= self.ripple * (time - (omega * time).sin() / omega);
+        }
+        time
+    }
+
+    /// A time by which `profile_time` has been reached for certain.
+    fn latest(&self, profile_time: f64) -> f64 {
+        (profile_time + self.ripple_period) / (1.0 - self.ripple) + self.stick_period
+    }
+}

@@ -1,0 +1,136 @@
+//! From lens position to blur: the thin lens, and a stack of pictures blurred beforehand.
+
+use crate::ConfigError;
+use crate::fourier::{Fourier, Texture};
+use crate::names::named;
+
+/// Shape of the blur.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PointSpread {
+    /// A disc of even brightness: geometric optics.
+    Disc,
+    /// A Gaussian with half the disc's radius as its sigma, which has the disc's variance.
+    Gaussian,
+}
+
+named!(PointSpread, "point spread", { Disc => "disc", Gaussian => "gaussian" });
+
+/// The optics (sensor-and-optics, section 2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OpticsConfig {
+    /// Growth of the blur circle's diameter, pixels per lens count from focus. 0.015 to 0.07; default 0.0175, and 3.8 times
+    /// that in the IMX636 presets.
+    pub blur_px_per_count: f64,
+    /// The growth above focus as a multiple of that below. Default 1; spherical aberration makes 1.15.
+    pub slope_ratio: f64,
+    /// Growth of the picture over the whole lens range, as a share; -0.04 to 0.04. Default 0.
+    pub breathing: f64,
+    /// Sigma of aberrations and diffraction in focus, pixels; the pixel's square aperture adds to it. Default 0.45.
+    pub floor_sigma_px: f64,
+    /// Shape of the blur. Default a disc.
+    pub point_spread: PointSpread,
+}
+
+impl OpticsConfig {
+    /// Radius of the blur circle, pixels, `counts` above (or, negative, below) focus.
+    pub(crate) fn radius(&self, counts: f64) -> f64 {
+        let slope = if counts > 0.0 { self.slope_ratio } else { 1.0 };
+        0.5 * self.blur_px_per_count * slope * counts.abs()
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), ConfigError> {
+        ConfigError::check("optics.blur_px_per_count", self.blur_px_per_count, 0.0, 1.0)?;
+        ConfigError::check("optics.slope_ratio", self.slope_ratio, 0.1, 10.0)?;
+        ConfigError::check("optics.breathing", self.breathing, -0.2, 0.2)?;
+        ConfigError::check("optics.floor_sigma_px", self.floor_sigma_px, 0.05, 20.0)
+    }
+}
+
+impl Default for OpticsConfig {
+    fn default() -> Self {
+        Self {
+            blur_px_per_count: 0.0175,
+            slope_ratio: 1.0,
+            breathing: 0.0,
+            floor_sigma_px: 0.45,
+            point_spread: PointSpread::Disc,
+        }
+    }
+}
+
+/// From one level of the stack to the next the variance of the blur grows by this factor: at 1.3 the picture changes so
+/// nearly in proportion to the variance that the blend of two levels cannot be told from the real thing.
+const VARIANCE_STEP: f64 = 1.3;
+
+/// A scene blurred by every degree that the lens can produce.
+#[derive(Debug, Clone)]
+pub(crate) struct BlurStack {
+    pub(crate) levels: Vec<Texture>,
+    /// Square of the blur radius of each level, pixels squared.
+    squares: Vec<f64>,
+}
+
+/// Two neighbouring levels and how to blend them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Blend {
+    /// The sharper level; the next one is the other.
+    pub(crate) level: usize,
+    /// Share of the other, 0 to 1.
+    pub(crate) share: f32,
+}
+
+impl BlurStack {
+    pub(crate) fn new(scene: &Texture, optics: &OpticsConfig, largest_radius: f64) -> Self {
+        let floor = optics.floor_sigma_px * optics.floor_sigma_px + 1.0 / 12.0;
+        // A disc of radius r has the variance r^2 / 4 along each axis.
+        let mut squares = vec![0.0];
+        let mut variance = floor;
+        while squares.len() < 2 || squares.last().is_some_and(|&last| last < largest_radius * largest_radius)
+        {
+            variance *= VARIANCE_STEP;
+            squares.push(4.0 * (variance - floor));
+        }
+        let fourier = Fourier::new(scene.width, scene.height);
+        let spectrum = fourier.spectrum(scene);
+        let transfer = |square: f64| {
+            let (radius, optics) = (square.sqrt(), *optics);
+            move |x: f64, y: f64| transfer(&optics, radius, x, y)
+        };
+        let mut levels = Vec::with_capacity(squares.len() + 1);
+        for pair in squares.chunks(2) {
+            let (first, second) = (transfer(pair[0]), transfer(*pair.last().unwrap_or(&pair[0])));
+            levels.extend(fourier.filtered(&spectrum, [&first, &second]));
+        }
+        levels.truncate(squares.len());
+        Self { levels, squares }
+    }
+
+    /// The blend for a blur of `radius` pixels. In proportion to the radius' square, that is to the variance: only then does
+    /// the picture stand still at focus, as it must for the event rate to dip there.
+    pub(crate) fn blend(&self, radius: f64) -> Blend {
+        let square = radius * radius;
+        let above = self.squares.partition_point(|&level| level <= square).clamp(1, self.squares.len() - 1);
+        let (low, high) = (self.squares[above - 1], self.squares[above]);
+        Blend { level: above - 1, share: ((square - low) / (high - low)).clamp(0.0, 1.0) as f32 }
+    }
+}
+
+/// What is left of a sinusoid of `x`, `y` cycles per pixel: the blur circle, the floor, and the pixel's square aperture.
+fn transfer(optics: &OpticsConfig, radius: f64, x: f64, y: f64) -> f64 {
+    let rho = x.hypot(y);
+    let gaussian = |sigma: f64| (-2.0 * (std::f64::consts::PI * sigma * rho).powi(2)).exp();
+    let blur = match optics.point_spread {
+        PointSpread::Gaussian => gaussian(radius / 2.0),
+        PointSpread::Disc => {
+            let argument = std::f64::consts::TAU * radius * rho;
+            if argument < 1e-6 { 1.0 } else { 2.0 * libm::j1(argument) / argument }
+        }
+    };
+    blur * gaussian(optics.floor_sigma_px) * sinc(x) * sinc(y)
+}
+
+/// sin(pi x) / (pi x).
+fn sinc(x: f64) -> f64 {
+    let argument = std::f64::consts::PI * x;
+    if argument.abs() < 1e-6 { 1.0 } else { argument.sin() / argument }
+}
