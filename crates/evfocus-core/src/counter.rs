@@ -31,6 +31,17 @@ impl Sub for EventCounts {
     }
 }
 
+/// Events of both polarities around one bin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct BinTotals {
+    /// Since the start, before the bin.
+    pub(crate) before: u64,
+    /// Since the start, up to the end of the bin.
+    pub(crate) until: u64,
+    /// The share of the bin that lies before the time asked for.
+    pub(crate) inside: f64,
+}
+
 /// A question that the counter cannot answer.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CounterError {
@@ -93,8 +104,8 @@ impl CumulativeCounter {
         let bin_us = i64::try_from(bin.as_micros()).unwrap_or(i64::MAX).max(1);
         let horizon_us = i64::try_from(horizon.as_micros()).unwrap_or(i64::MAX);
         // One bin more for the total before the oldest whole bin, one for the newest, incomplete one.
-        let bins =
-            usize::try_from(horizon_us / bin_us).unwrap_or(usize::MAX).saturating_add(2).next_power_of_two();
+        let bins = horizon_us.saturating_add(bin_us - 1) / bin_us;
+        let bins = usize::try_from(bins).unwrap_or(usize::MAX).saturating_add(2).next_power_of_two();
         Self {
             bin_us,
             ring: vec![[0; 2]; bins],
@@ -181,13 +192,14 @@ impl CumulativeCounter {
         Ok(self.total_until(to_us)? - self.total_until(from_us)?)
     }
 
-    /// Events before `time_us` since the start, without those that only the ring's start remembers.
-    fn total_until(&self, time_us: f64) -> Result<EventCounts, CounterError> {
+    /// Totals at the begin and at the end of the bin that holds `time_us`, and the share of the bin before it.
+    fn bracket(&self, time_us: f64) -> Result<([u64; 2], [u64; 2], f64), CounterError> {
         if !self.started {
             return Err(CounterError::Empty);
         }
-        let since = time_us - self.origin_us as f64;
-        let bins = since / self.bin_us as f64;
+        if time_us.is_nan() {
+            return Err(CounterError::NotAnInterval { from_us: time_us, to_us: time_us });
+        }
         if time_us > self.newest_end_us as f64 {
             return Err(CounterError::NotYetCounted { asked_us: time_us, newest_us: self.newest_end_us });
         }
@@ -195,13 +207,28 @@ impl CumulativeCounter {
         if time_us < oldest_us as f64 {
             return Err(CounterError::Overwritten { asked_us: time_us, oldest_us });
         }
+        let bins = (time_us - self.origin_us as f64) / self.bin_us as f64;
         let bin = (libm::floor(bins) as i64).min(self.newest);
-        let inside = bins - bin as f64;
         let end = self.ring[bin as usize & self.mask];
         // Bin -1 is the empty time before the start; for any other oldest bin the one before it is still in the ring.
         let start = if bin == 0 { [0; 2] } else { self.ring[(bin - 1) as usize & self.mask] };
+        Ok((start, end, bins - bin as f64))
+    }
+
+    /// Events before `time_us` since the start.
+    fn total_until(&self, time_us: f64) -> Result<EventCounts, CounterError> {
+        let (start, end, inside) = self.bracket(time_us)?;
         let interpolate = |start: u64, end: u64| start as f64 + inside * (end - start) as f64;
         Ok(EventCounts { off: interpolate(start[0], end[0]), on: interpolate(start[1], end[1]) })
+    }
+
+    /// What is known about the bin that holds `time_us`.
+    ///
+    /// # Errors
+    /// [`CounterError`] if the time is not within what has been counted and not overwritten.
+    pub(crate) fn bin_at(&self, time_us: f64) -> Result<BinTotals, CounterError> {
+        let (start, end, inside) = self.bracket(time_us)?;
+        Ok(BinTotals { before: start[0] + start[1], until: end[0] + end[1], inside })
     }
 
     /// The earliest time that can still be asked for.

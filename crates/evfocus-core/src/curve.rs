@@ -44,7 +44,7 @@ impl FocusCurve {
             let from = sweep.start.0 as f64 + index as f64 * step;
             let middle = from + step / 2.0;
             if let (Ok(rate), Ok(position)) =
-                (event_rate(sweep.counter, from, from + step), sweep.trace.position_at(middle))
+                (event_rate(sweep.counter, from, from + step), sweep.position_at(middle))
             {
                 self.points.push(CurvePoint { t_us: middle, position, rate });
             }

@@ -1,6 +1,7 @@
 //! The events of the sweep under way, packed, in a bounded buffer.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use crate::event::{Event, Polarity};
 use crate::units::CameraMicros;
@@ -59,8 +60,16 @@ impl EventStore {
 
     /// Index of the first event at or after `micros`, if times do not decrease.
     pub fn first_at_or_after(&self, micros: f64) -> usize {
+        self.first_at_or_after_within(0..u64::MAX, micros)
+    }
+
+    /// Index of the first event at or after `micros` among the events `indices`; its end if there is none.
+    pub fn first_at_or_after_within(&self, indices: Range<u64>, micros: f64) -> usize {
         let since = micros - self.origin.0 as f64;
-        self.packed.partition_point(|&packed| ((packed >> TIME_SHIFT) as f64) < since)
+        let end = usize::try_from(indices.end).unwrap_or(usize::MAX).min(self.packed.len());
+        let start = usize::try_from(indices.start).unwrap_or(usize::MAX).min(end);
+        let within = self.packed.get(start..end).unwrap_or_default();
+        start + within.partition_point(|&packed| ((packed >> TIME_SHIFT) as f64) < since)
     }
 
     fn unpack(&self, packed: u64) -> Event {

@@ -2,6 +2,7 @@
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use crate::units::{HostMicros, LensPosition, Timestamp};
 
@@ -63,9 +64,9 @@ pub enum LensTraceError {
 /// A stretch of the trace in which the lens goes one way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg<T> {
-    /// First instant, in the middle of the rest before the motion if there is one.
+    /// First instant: the first sample, or the middle of the rest at the turn before.
     pub start: T,
-    /// Last instant.
+    /// Last instant: the middle of the rest at the turn, or the last sample.
     pub end: T,
     /// Position at the start of the motion.
     pub from: LensPosition,
@@ -205,33 +206,38 @@ impl<T: Timestamp> LensTrace<T> {
             return Vec::new();
         };
         let mut legs: Vec<Leg<T>> = Vec::new();
-        let mut leg_start = start;
-        let mut origin = first;
-        // The farthest position of the leg under way, and when the lens was first and last within `tolerance / 4` of it.
-        let (mut farthest, mut reached, mut left) = (first, start, start);
+        let mut leg = Leg { start, end, from: first, to: first };
+        let mut leg_index = 0;
         let mut direction = 0.0;
-        for (time, position) in self.samples() {
-            let travelled = (position.0 - farthest.0) * direction;
+        for (index, (_, position)) in self.samples().enumerate() {
+            let travelled = position.counts_from(leg.to) * direction;
             if direction == 0.0 {
-                if position.distance(origin) > tolerance {
-                    direction = if position.0 > origin.0 { 1.0 } else { -1.0 };
-                    (farthest, reached, left) = (position, time, time);
+                if position.distance(leg.from) > tolerance {
+                    direction = if position.0 > leg.from.0 { 1.0 } else { -1.0 };
+                    leg.to = position;
                 }
             } else if travelled > 0.0 {
-                (farthest, reached, left) = (position, time, time);
-            } else if travelled > -tolerance / 4.0 {
-                left = time;
+                leg.to = position;
             } else if travelled < -tolerance {
-                let turn = T::from_micros(i64::midpoint(reached.micros(), left.micros()));
-                legs.push(Leg { start: leg_start, end: turn, from: origin, to: farthest });
-                (leg_start, origin) = (turn, farthest);
+                let turn = self.middle_of_rest(leg_index..index, leg.to, tolerance / 2.0).unwrap_or(leg.end);
+                legs.push(Leg { end: turn, ..leg });
+                leg = Leg { start: turn, end, from: leg.to, to: position };
+                leg_index = index;
                 direction = -direction;
-                (farthest, reached, left) = (position, time, time);
             }
         }
         if direction != 0.0 {
-            legs.push(Leg { start: leg_start, end, from: origin, to: farthest });
+            legs.push(leg);
         }
         legs
+    }
+
+    /// The middle between the first and the last time that the lens was within `band` of `place` among the samples `indices`.
+    /// Noise decides which sample of a rest is the farthest, so that one alone says nothing about when the rest began.
+    fn middle_of_rest(&self, indices: Range<usize>, place: LensPosition, band: f64) -> Option<T> {
+        let mut near = self.samples.range(indices).filter(|(_, position)| position.distance(place) <= band);
+        let &(reached, _) = near.next()?;
+        let left = near.next_back().map_or(reached, |&(time, _)| time);
+        Some(T::from_micros(i64::midpoint(reached.micros(), left.micros())))
     }
 }

@@ -38,7 +38,7 @@ pub use measure::{PixelCounts, event_rate};
 pub use quality::SweepQuality;
 pub use report::{Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport};
 pub use search::{Estimate, Method, SearchError, Searcher};
-pub use sweep::{Sweep, SweepCapacity, SweepRecorder};
+pub use sweep::{HOLD, Sweep, SweepCapacity, SweepRecorder};
 pub use units::{
     CameraMicros, EventRate, HostMicros, LensPosition, LensRange, LensSpeed, Timestamp, UnitError,
 };

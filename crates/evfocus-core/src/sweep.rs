@@ -2,11 +2,11 @@
 
 use core::time::Duration;
 
-use crate::counter::CumulativeCounter;
+use crate::counter::{CounterError, CumulativeCounter};
 use crate::event::{Event, Geometry};
 use crate::event_store::EventStore;
-use crate::lens_trace::LensTrace;
-use crate::units::CameraMicros;
+use crate::lens_trace::{LensTrace, LensTraceError};
+use crate::units::{CameraMicros, LensPosition};
 
 /// How much a sweep may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +24,10 @@ impl Default for SweepCapacity {
         Self { bin: CumulativeCounter::DEFAULT_BIN, longest: Duration::from_secs(20), events: 16_000_000 }
     }
 }
+
+/// How long the lens is taken to stay where a trace begins and ends: a log of positions starts late and ends early by a sample or
+/// a few, and the lens rests there.
+pub const HOLD: Duration = Duration::from_millis(50);
 
 /// Gathers the events of one sweep.
 #[derive(Debug, Clone)]
@@ -88,10 +92,10 @@ impl SweepRecorder {
     }
 
     /// The sweep as it stands: its events with the lens positions of `trace`, from the first event to the last one, as far as
-    /// the trace reaches. `None` before the first event, and if the trace lies elsewhere.
+    /// the trace reaches; its ends are held for [`HOLD`]. `None` before the first event, and if the trace lies elsewhere.
     pub fn sweep<'a>(&'a self, trace: &'a LensTrace<CameraMicros>) -> Option<Sweep<'a>> {
         let ((first, last), (trace_first, trace_last)) = (self.span?, (trace.first()?.0, trace.last()?.0));
-        let (start, end) = (first.max(trace_first), last.min(trace_last));
+        let (start, end) = (first.max(trace_first - HOLD), last.min(trace_last + HOLD));
         if start > end {
             return None;
         }
@@ -122,7 +126,29 @@ impl Sweep<'_> {
         self.end.micros_since(self.start) as f64
     }
 
-    /// Events in the range.
+    /// The lens position at `micros` of camera time, held at the ends of the trace.
+    ///
+    /// # Errors
+    /// [`LensTraceError::Empty`] for a trace without samples.
+    pub fn position_at(&self, micros: f64) -> Result<LensPosition, LensTraceError> {
+        self.trace.position_near(micros).ok_or(LensTraceError::Empty)
+    }
+
+    /// Events before `micros` of camera time: exact to the event if all were kept, else interpolated within the counter's bin.
+    /// The same effort for any number of events: the counter says between which two events of the store to look.
+    ///
+    /// # Errors
+    /// [`CounterError`] for times that the counter does not cover.
+    pub fn events_before(&self, micros: f64) -> Result<f64, CounterError> {
+        let bin = self.counter.bin_at(micros)?;
+        if self.store.is_complete() {
+            Ok(self.store.first_at_or_after_within(bin.before..bin.until, micros) as f64)
+        } else {
+            Ok(bin.before as f64 + bin.inside * (bin.until - bin.before) as f64)
+        }
+    }
+
+    /// Events fed since the start of the sweep.
     pub fn events(&self) -> u64 {
         let (on, off) = self.counter.totals();
         on + off

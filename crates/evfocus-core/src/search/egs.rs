@@ -55,14 +55,18 @@ pub fn golden_search<E>(
     Ok(((t1, t2), iterations))
 }
 
-/// `egs`: golden search on the event rate, two subtractions of partial sums a comparison. Equal windows make rates and counts
+/// `egs`: golden search on the event rate, a few differences of partial sums a comparison. Equal windows make rates and counts
 /// the same question.
 pub(super) fn search(sweep: &Sweep<'_>) -> Result<Estimate, SearchError> {
-    let counter = sweep.counter;
+    let before = |micros: f64| sweep.events_before(micros);
+    // Windows are closed, and times are whole microseconds: "up to and with t" is "before floor(t) + 1". The counter ends with
+    // its newest bin, which holds every event there is.
+    let newest_us = sweep.counter.newest().0 as f64;
+    let until = |micros: f64| before((libm::floor(micros) + 1.0).min(newest_us));
     let (range, iterations) = golden_search(bounds(sweep), |first, second| {
         // What both windows hold cancels: compare what only one holds.
-        let only_first = counter.count_between(first.0, second.0)?.total();
-        let only_second = counter.count_between(first.1, second.1)?.total();
+        let only_first = before(second.0)? - before(first.0)?;
+        let only_second = until(second.1)? - until(first.1)?;
         Ok::<_, SearchError>(if only_first + only_second < FEWEST_DECISIVE_EVENTS {
             Comparison::Undecided
         } else if only_first >= only_second {
@@ -92,7 +96,7 @@ pub(super) fn search_squared(sweep: &Sweep<'_>, pixels: &mut PixelCounts) -> Res
     answer(sweep, range, iterations)
 }
 
-/// The range of all events, from the first one to just after the last one.
+/// The range of all events, from the first one to the last one.
 fn bounds(sweep: &Sweep<'_>) -> (f64, f64) {
     (sweep.start.0 as f64, sweep.end.0 as f64)
 }
@@ -100,7 +104,7 @@ fn bounds(sweep: &Sweep<'_>) -> (f64, f64) {
 fn answer(sweep: &Sweep<'_>, range: (f64, f64), iterations: u32) -> Result<Estimate, SearchError> {
     let t_us = f64::midpoint(range.0, range.1);
     Ok(Estimate {
-        position: sweep.trace.position_at(t_us)?,
+        position: sweep.position_at(t_us)?,
         t_us,
         iterations,
         interval_us: GOLDEN_RATIO * (range.1 - range.0),

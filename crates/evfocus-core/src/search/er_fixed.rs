@@ -28,5 +28,5 @@ pub(super) fn search(sweep: &Sweep<'_>, interval: Duration) -> Result<Estimate, 
         iterations += 1;
         centre = start + f64::from(iterations) * STEP_US;
     }
-    Ok(Estimate { position: sweep.trace.position_at(best_us)?, t_us: best_us, iterations, interval_us })
+    Ok(Estimate { position: sweep.position_at(best_us)?, t_us: best_us, iterations, interval_us })
 }
