@@ -1,0 +1,39 @@
+//! What each method's reply holds, as the client reads it.
+
+use serde::Deserialize;
+
+use crate::{Device, Progress, Report, Status};
+
+/// Of `GetStatus` and `Monitor`.
+#[derive(Debug, Deserialize)]
+pub struct OfStatus {
+    pub status: Status,
+}
+
+/// Of `Focus`.
+#[derive(Debug, Deserialize)]
+pub struct OfFocus {
+    pub progress: Progress,
+}
+
+/// Of `Abort`.
+#[derive(Debug, Deserialize)]
+pub(super) struct OfAbort {
+    pub(super) run_id: Option<u64>,
+}
+
+/// Of `GetReport`.
+#[derive(Debug, Deserialize)]
+pub(super) struct OfReport {
+    pub(super) report: Report,
+}
+
+/// Of `ListDevices`.
+#[derive(Debug, Deserialize)]
+pub(super) struct OfDevices {
+    pub(super) devices: Vec<Device>,
+}
+
+/// Of the methods without results.
+#[derive(Debug, Deserialize)]
+pub(super) struct Nothing {}

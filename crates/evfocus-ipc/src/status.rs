@@ -1,0 +1,170 @@
+//! What the daemon is doing, in libcamera's vocabulary.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::LensRange;
+
+/// Who decides about the lens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// The lens moves to where it is told; the state is always idle.
+    Manual,
+    /// The lens moves by itself, but only when a focus run is started.
+    #[default]
+    Auto,
+}
+
+/// How the last focus run went, or that one is under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// No run yet, or the last one was aborted.
+    #[default]
+    Idle,
+    /// A run is under way.
+    Scanning,
+    /// The last run found focus and the lens stands there.
+    Focused,
+    /// The last run failed; its report has a named reason.
+    Failed,
+}
+
+/// What a run is at. Varlink's enumerations know no hyphen, hence `to_start`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// No run is under way.
+    #[default]
+    None,
+    /// The lens finds its reference position.
+    Homing,
+    /// The lens moves to where the sweep starts.
+    ToStart,
+    /// The lens rests there; hot pixels are learnt.
+    Resting,
+    /// The lens rests before the sweep; hot pixels are learnt.
+    Resting,
+    /// The first sweep; events are counted.
+    Sweeping,
+    /// The second sweep, on the way back.
+    Returning,
+    /// The counts of a sweep are completed and searched.
+    Searching,
+    /// The lens moves to the position found, past backlash.
+    Approaching,
+    /// It is looked whether the lens is there.
+    Verifying,
+    /// The run failed and the lens goes back to where it was.
+    Restoring,
+}
+
+impl Mode {
+    /// The name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Manual => "manual",
+            Self::Auto => "auto",
+        }
+    }
+}
+
+impl State {
+    /// The name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Idle => "idle",
+            Self::Scanning => "scanning",
+            Self::Focused => "focused",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+impl Phase {
+    /// The name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Homing => "homing",
+            Self::ToStart => "to_start",
+            Self::Resting => "resting",
+            Self::Resting => "resting",
+            Self::Sweeping => "sweeping",
+            Self::Returning => "returning",
+            Self::Searching => "searching",
+            Self::Approaching => "approaching",
+            Self::Verifying => "verifying",
+            Self::Restoring => "restoring",
+            Self::Restoring => "restoring",
+        }
+    }
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl fmt::Display for Phase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// The daemon at one moment.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Status {
+    /// Who decides about the lens.
+    pub mode: Mode,
+    /// How focusing stands.
+    pub state: State,
+    /// What the run under way is at; [`Phase::None`] without one.
+    pub phase: Phase,
+    /// The run under way.
+    pub run_id: Option<u64>,
+    /// Where the lens is, in its own counts; nothing before its first answer.
+    pub lens_position: Option<f64>,
+    /// Whether the lens is moving.
+    pub lens_moving: bool,
+    /// The positions that the lens accepts, in counts.
+    pub lens_range: Option<LensRange>,
+    /// Events per second, over the last tenth of a second or so.
+    pub event_rate: f64,
+    /// Events known to be lost since the daemon started, anywhere between the sensor and the counter.
+    pub events_lost: u64,
+    /// The last run that ended.
+    pub last_run: Option<LastRun>,
+    /// The camera in use, model and serial; nothing while none is there.
+    pub camera: Option<String>,
+    /// The lens in use, model and serial; nothing while none is there.
+    pub lens: Option<String>,
+    /// What is wrong at the moment, in words, with what to do about it; nothing if all is well.
+    pub fault: Option<String>,
+    /// The daemon's version.
+    pub version: String,
+    /// Seconds since the daemon started.
+    pub uptime_s: f64,
+}
+
+/// How the last run ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LastRun {
+    /// Its number, for `GetReport`.
+    pub id: u64,
+    /// [`State::Focused`], [`State::Failed`], or [`State::Idle`] for an aborted run.
+    pub state: State,
+    /// The position found, in counts.
+    pub position: Option<f64>,
+    /// The named reason of a failure, in kebab case.
+    pub reason: Option<String>,
+}
