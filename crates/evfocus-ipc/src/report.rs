@@ -108,42 +108,6 @@ pub struct Quality {
     pub flicker_depth: f64,
 }
 
-/// One sweep of the lens.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Sweep {
-    /// Which one.
-    pub direction: Direction,
-    /// Where the lens began, in counts.
-    pub from: f64,
-    /// Where it ended, in counts.
-    pub to: f64,
-    /// Camera time of the first event searched, in microseconds.
-    pub start_us: i64,
-    /// Camera time of the last one.
-    pub end_us: i64,
-    /// The focus curve.
-    pub curve: Curve,
-    /// What each estimator said, whether or not it decided.
-    pub estimators: Vec<Estimate>,
-    /// What the counts look like.
-    pub quality: Quality,
-}
-
-/// What the counts of a sweep look like.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Quality {
-    /// Share of the 5 ms windows whose rate is above 90 % of the 99th percentile; above 0.3 the rate is capped.
-    pub share_at_ceiling: f64,
-    /// Variance over mean of the counts in 0.2 ms; 1 for chance, below 0.1 the read-out is the bottleneck.
-    pub regularity: f64,
-    /// Variance over mean of the counts in fiftieths of the sweep; below 2 the rate does not depend on the lens.
-    pub dispersion: f64,
-    /// The mains frequency with the stronger trace, 100 or 120.
-    pub flicker_hz: u64,
-    /// Amplitude of ON minus OFF at that frequency over the mean event rate, 0 to 2.
-    pub flicker_depth: f64,
-}
-
 /// The focus curve; all lists have the same length.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Curve {

@@ -134,7 +134,6 @@ impl Arguments {
             speed_counts_per_s: self.take("speed_counts_per_s")?,
             interval_us: self.take("interval_us")?,
             directions: self.take("directions")?,
-            directions: self.take("directions")?,
         })
     }
 
@@ -202,7 +201,7 @@ mod tests {
         ] {
             match parse(name, json) {
                 Err(Error::InvalidArgument { name: wrong, .. }) => {
-                    assert_eq!(wrong, argument, "{name}({json})")
+                    assert_eq!(wrong, argument, "{name}({json})");
                 }
                 other => panic!("{name}({json}): {other:?}"),
             }

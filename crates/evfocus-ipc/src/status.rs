@@ -45,8 +45,6 @@ pub enum Phase {
     ToStart,
     /// The lens rests there; hot pixels are learnt.
     Resting,
-    /// The lens rests before the sweep; hot pixels are learnt.
-    Resting,
     /// The first sweep; events are counted.
     Sweeping,
     /// The second sweep, on the way back.
@@ -91,13 +89,11 @@ impl Phase {
             Self::Homing => "homing",
             Self::ToStart => "to_start",
             Self::Resting => "resting",
-            Self::Resting => "resting",
             Self::Sweeping => "sweeping",
             Self::Returning => "returning",
             Self::Searching => "searching",
             Self::Approaching => "approaching",
             Self::Verifying => "verifying",
-            Self::Restoring => "restoring",
             Self::Restoring => "restoring",
         }
     }
