@@ -204,9 +204,8 @@ impl Running {
                 self.lost += 1;
                 continue;
             }
-            let t = camera_time(link, spike.micros, reset).0;
             self.outbox.push_back(Event {
-                t: CameraMicros(t - t.rem_euclid(resolution)),
+                t: stamped(camera_time(link, spike.micros, reset), resolution),
                 x: (spike.pixel % width) as u16,
                 y: (spike.pixel / width) as u16,
                 polarity: Polarity::from_on(spike.on),
@@ -214,7 +213,8 @@ impl Running {
         }
         let reset =
             faults.iter().filter(|(kind, _)| *kind == FaultKind::CameraTimeReset).map(|(_, at)| *at).last();
-        self.reached = camera_time(link, end - 1, reset.map(|at| (at * 1e6) as i64));
+        let reached = camera_time(link, end - 1, reset.map(|at| (at * 1e6) as i64));
+        self.reached = stamped(reached, resolution);
         self.next_micros = end;
         self.schedule(link, epoch);
     }
@@ -231,6 +231,11 @@ impl Running {
             _ => Some(self.reached),
         };
     }
+}
+
+/// A time as the camera states it, in steps of `resolution` microseconds.
+fn stamped(time: CameraMicros, resolution: i64) -> CameraMicros {
+    CameraMicros(time.0 - time.0.rem_euclid(resolution))
 }
 
 /// The camera's clock, `micros` after the rig was made; it counts from zero again at `reset`.

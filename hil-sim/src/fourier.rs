@@ -48,20 +48,19 @@ impl Fourier {
         values
     }
 
-    /// The pictures that two real and even `transfer` functions make of a spectrum; both at the price of one, as the real
-    /// and the imaginary part. Transfer functions are given the frequencies along x and y in cycles per pixel.
+    /// The pictures that two real and even transfer functions make of a spectrum; both at the price of one, as the real and
+    /// the imaginary part. `transfer` is given the indices of the frequencies along x and y; see [`frequency`].
     pub(crate) fn filtered(
         &self,
         spectrum: &[Complex<f32>],
-        transfer: [&dyn Fn(f64, f64) -> f64; 2],
+        transfer: impl Fn(usize, usize) -> [f32; 2],
     ) -> [Texture; 2] {
         let mut values = Vec::with_capacity(spectrum.len());
-        for (column, column_values) in spectrum.chunks_exact(self.height).enumerate() {
-            let x = frequency(column, self.width);
-            for (row, value) in column_values.iter().enumerate() {
-                let y = frequency(row, self.height);
-                values.push(value * Complex::new(transfer[0](x, y) as f32, transfer[1](x, y) as f32));
-            }
+        for (x, column_values) in spectrum.chunks_exact(self.height).enumerate() {
+            values.extend(column_values.iter().enumerate().map(|(y, value)| {
+                let [first, second] = transfer(x, y);
+                value * Complex::new(first, second)
+            }));
         }
         self.columns[1].process(&mut values);
         let mut values = transposed(&values, self.height);
@@ -77,8 +76,8 @@ impl Fourier {
     }
 }
 
-/// Frequency of bin `index` of `count`, cycles per pixel, -0.5 to 0.5.
-fn frequency(index: usize, count: usize) -> f64 {
+/// Frequency with index `index` of `count`, cycles per pixel, -0.5 to 0.5.
+pub(crate) fn frequency(index: usize, count: usize) -> f64 {
     let signed = if index * 2 > count { index as f64 - count as f64 } else { index as f64 };
     signed / count as f64
 }

@@ -1,5 +1,7 @@
 //! The light on the sensor at one instant: blur, motion, breathing and flicker put together.
 
+use std::sync::OnceLock;
+
 use crate::config::RigConfig;
 use crate::motion::{Motion, Pose};
 use crate::optics::{Blend, BlurStack};
@@ -8,7 +10,8 @@ use crate::random::Stream;
 /// Everything about the light that does not change while the rig lives.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    planes: Vec<(BlurStack, f64)>,
+    /// Each plane's stack and focus position. Made when first looked at: who only wants the lens does not wait for it.
+    planes: OnceLock<Vec<(BlurStack, f64)>>,
     motion: Motion,
     config: RigConfig,
     width: usize,
@@ -36,20 +39,27 @@ impl Picture {
     pub(crate) fn new(config: &RigConfig) -> Self {
         let geometry = config.sensor.geometry;
         let (width, height) = (usize::from(geometry.width), usize::from(geometry.height));
-        let planes = config.scene.planes(width, height, config.seed).into_iter().map(|plane| {
-            let focus = if plane.second { config.second_focus } else { config.focus };
-            let ends = [config.lens.range.min(), config.lens.range.max()];
-            let largest = ends.map(|end| config.optics.radius(end.counts_from(focus)));
-            let stack = BlurStack::new(&plane.texture, &config.optics, largest[0].max(largest[1]));
-            (stack, focus.0)
-        });
         Self {
-            planes: planes.collect(),
+            planes: OnceLock::new(),
             motion: Motion::new(&config.motion, &mut Stream::Shake.generator(config.seed)),
             config: config.clone(),
             width,
             height,
         }
+    }
+
+    fn planes(&self) -> &[(BlurStack, f64)] {
+        self.planes.get_or_init(|| {
+            let config = &self.config;
+            let planes = config.scene.planes(self.width, self.height, config.seed).into_iter().map(|plane| {
+                let focus = if plane.second { config.second_focus } else { config.focus };
+                let ends = [config.lens.range.min(), config.lens.range.max()];
+                let largest = ends.map(|end| config.optics.radius(end.counts_from(focus)));
+                let stack = BlurStack::new(&plane.texture, &config.optics, largest[0].max(largest[1]));
+                (stack, focus.0)
+            });
+            planes.collect()
+        })
     }
 
     pub(crate) fn config(&self) -> &RigConfig {
@@ -67,7 +77,7 @@ impl Picture {
         let optics = &self.config.optics;
         View {
             blends: self
-                .planes
+                .planes()
                 .iter()
                 .map(|(stack, focus)| stack.blend(optics.radius(position - focus)))
                 .collect(),
@@ -79,7 +89,7 @@ impl Picture {
 
     /// Puts the light of `view` into `image`, DN, row by row.
     pub(crate) fn render(&self, view: &View, scratch: &mut Scratch, image: &mut [f32]) {
-        for (plane, ((stack, _), blend)) in self.planes.iter().zip(&view.blends).enumerate() {
+        for (plane, ((stack, _), blend)) in self.planes().iter().zip(&view.blends).enumerate() {
             self.render_plane(stack, *blend, view, scratch, image, plane > 0);
         }
         if (view.gain - 1.0).abs() > 0.0 {

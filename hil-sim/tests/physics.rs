@@ -3,9 +3,7 @@
 //! The figures are those of the notes on sensor and optics, section 3, made with another program: dead leaves on 160 x 120
 //! pixels, 0.015 px per count, thresholds 0.2, the range in 2 s, events in bins of 40 counts about focus.
 
-mod common;
-
-use common::{SweepCurve, section_three, sweep_curve};
+use crate::sweep::{SweepCurve, section_three, sweep_curve};
 use hil_sim::{Light, MotionConfig, RigConfig};
 
 fn show(name: &str, curve: &SweepCurve) {

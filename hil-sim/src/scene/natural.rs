@@ -4,19 +4,19 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::fourier::{Fourier, Texture};
+use crate::fourier::{Fourier, Texture, frequency};
 
-/// Discs with radii of 2 to 40 pixels, probability as radius^-3, each hiding those before it; brightness evenly distributed
-/// in its logarithm, 5 to 250 DN.
+/// Discs with radii of 3 to 40 pixels, probability as radius^-3, each hiding those before it; brightness evenly distributed
+/// in its logarithm, 12 to 240 DN. With these numbers the event rates come out as in sensor-and-optics, section 3.
 pub(super) fn dead_leaves(canvas: &mut Texture, rng: &mut Xoshiro256PlusPlus) {
-    let (smallest, largest) = (2.0_f64, 40.0_f64);
+    let (smallest, largest) = (3.0_f64, 40.0_f64);
     canvas.values.fill(60.0);
-    // The mean disc covers about 38 pixels; eight layers leave nothing of the ground.
-    let discs = canvas.values.len() * 8 / 38;
+    // The mean disc covers about 150 pixels; eight layers leave nothing of the ground.
+    let discs = canvas.values.len() * 8 / 150;
     for _ in 0..discs {
         let (inner, outer) = (smallest.powi(-2), largest.powi(-2));
         let radius = (inner + rng.random::<f64>() * (outer - inner)).powf(-0.5);
-        let value = 5.0 * 50_f64.powf(rng.random::<f64>());
+        let value = 12.0 * 20_f64.powf(rng.random::<f64>());
         let (x, y) = (rng.random::<f64>() * canvas.width as f64, rng.random::<f64>() * canvas.height as f64);
         disc(canvas, (x, y), radius, value as f32);
     }
@@ -46,11 +46,11 @@ pub(super) fn pink_noise(canvas: &mut Texture, rng: &mut Xoshiro256PlusPlus) {
     }
     let fourier = Fourier::new(canvas.width, canvas.height);
     let longest = 1.0 / canvas.width.max(canvas.height) as f64;
-    let pink = |x: f64, y: f64| {
-        let rho = x.hypot(y);
-        if rho == 0.0 { 1.0 } else { longest / rho.max(longest) }
-    };
-    let [texture, _] = fourier.filtered(&fourier.spectrum(canvas), [&pink, &pink]);
+    let (width, height) = (canvas.width, canvas.height);
+    let [texture, _] = fourier.filtered(&fourier.spectrum(canvas), |x, y| {
+        let rho = frequency(x, width).hypot(frequency(y, height));
+        [if x + y == 0 { 1.0 } else { (longest / rho.max(longest)) as f32 }; 2]
+    });
     let count = texture.values.len() as f32;
     let mean = texture.values.iter().sum::<f32>() / count;
     let variance = texture.values.iter().map(|value| (value - mean).powi(2)).sum::<f32>() / count;

@@ -4,19 +4,21 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_core::{Event, EventBatch, Geometry, HostMicros, LensPosition};
+use evfocus_core::{Event, EventBatch, Geometry, HostMicros};
 use evfocus_hal::{Camera, Clock, Lens, VirtualClock};
 use hil_sim::{CameraModel, Light, LinkConfig, OpticsConfig, Rig, RigConfig, SensorConfig};
 
 /// The set-up of section 3: see the module that uses it.
-pub fn section_three(light: Light) -> RigConfig {
+pub(crate) fn section_three(light: Light) -> RigConfig {
     let sensor = SensorConfig {
         geometry: Geometry { width: 160, height: 120 },
         ..SensorConfig::preset(CameraModel::Davis346, light)
     };
     let sensor = match light {
         Light::Light => sensor,
-        Light::Dark => SensorConfig { cutoff_hz: 25.0, shot_noise_black_hz: 3.0, shot_noise_white_hz: 3.0, ..sensor },
+        Light::Dark => {
+            SensorConfig { cutoff_hz: 25.0, shot_noise_black_hz: 3.0, shot_noise_white_hz: 3.0, ..sensor }
+        }
     };
     RigConfig {
         sensor,
@@ -28,25 +30,25 @@ pub fn section_three(light: Light) -> RigConfig {
 }
 
 /// Events against lens position in a sweep from the low end of the range to the high end at full speed.
-pub struct SweepCurve {
+pub(crate) struct SweepCurve {
     /// Centre of each bin, counts from focus.
-    pub offsets: Vec<f64>,
-    pub on: Vec<u32>,
-    pub off: Vec<u32>,
+    pub(crate) offsets: Vec<f64>,
+    pub(crate) on: Vec<u32>,
+    pub(crate) off: Vec<u32>,
 }
 
 impl SweepCurve {
-    pub fn total(&self, bin: usize) -> u32 {
+    pub(crate) fn total(&self, bin: usize) -> u32 {
         self.on[bin] + self.off[bin]
     }
 
     /// Highest bin with its centre in `low..high`: offset and count.
-    pub fn peak(&self, low: f64, high: f64) -> (f64, u32) {
+    pub(crate) fn peak(&self, low: f64, high: f64) -> (f64, u32) {
         self.extreme(low, high, |new, old| new > old)
     }
 
     /// Lowest bin.
-    pub fn dip(&self, low: f64, high: f64) -> (f64, u32) {
+    pub(crate) fn dip(&self, low: f64, high: f64) -> (f64, u32) {
         self.extreme(low, high, |new, old| new < old)
     }
 
@@ -62,8 +64,9 @@ impl SweepCurve {
     }
 
     /// Share of ON among the events with offsets in `low..high`.
-    pub fn on_share(&self, low: f64, high: f64) -> f64 {
-        let bins = (0..self.offsets.len()).filter(|&bin| self.offsets[bin] >= low && self.offsets[bin] < high);
+    pub(crate) fn on_share(&self, low: f64, high: f64) -> f64 {
+        let bins =
+            (0..self.offsets.len()).filter(|&bin| self.offsets[bin] >= low && self.offsets[bin] < high);
         let (on, all) = bins.fold((0, 0), |(on, all), bin| (on + self.on[bin], all + self.total(bin)));
         f64::from(on) / f64::from(all)
     }
@@ -93,7 +96,7 @@ impl fmt::Display for SweepCurve {
 
 /// Sweeps the rig's lens through its range. Positions are the glass's true ones at the events' times (the link's clock must
 /// be the host's).
-pub fn sweep_curve(config: &RigConfig) -> SweepCurve {
+pub(crate) fn sweep_curve(config: &RigConfig) -> SweepCurve {
     let clock = Arc::new(VirtualClock::new());
     let rig = Rig::new(config.clone(), Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
     let (mut camera, mut lens) = rig.devices();
@@ -120,7 +123,7 @@ pub fn sweep_curve(config: &RigConfig) -> SweepCurve {
 }
 
 /// All events that arrive within `duration`.
-pub fn run(camera: &mut dyn Camera, clock: &dyn Clock, duration: Duration) -> Vec<Event> {
+pub(crate) fn run(camera: &mut dyn Camera, clock: &dyn Clock, duration: Duration) -> Vec<Event> {
     let end = clock.now() + duration;
     let mut batch = EventBatch::with_capacity(100_000);
     let mut events = Vec::new();
@@ -129,9 +132,4 @@ pub fn run(camera: &mut dyn Camera, clock: &dyn Clock, duration: Duration) -> Ve
         events.extend_from_slice(&batch.events);
     }
     events
-}
-
-/// A lens position.
-pub fn at(counts: f64) -> LensPosition {
-    LensPosition(counts)
 }
