@@ -1,15 +1,17 @@
 //! Recordings of event cameras: reading, writing, summing up.
 //!
-//! [`Recording::open`] recognises a file by its content and hands out its events batch by batch; a summary counts a whole
+//! [`Recording::open`] recognises a file by its content and hands out its events batch by batch; [`Summary`] counts a whole
 //! file in one pass; [`Evt3Writer`] and its siblings write files that the tools of the field read; [`positions`] reads and
 //! writes where the lens was meanwhile. The decoders in [`decode`] are pure functions of bytes and serve live cameras too.
 //!
 //! Not its job: judging whether a recording is good enough to focus with, opening devices, decompressing archives.
 //!
 //! # Memory
-//! A reader holds one buffer of [`READ_BYTES`] whatever the
+//! A reader holds one buffer of [`READ_BYTES`] (for AEDAT4 one packet, at most [`aedat4::MAX_PACKET_BYTES`]) whatever the
 //! size of the file, and appends at most [`MAX_EVENTS_PER_READ`] events to the batch it is lent.
 
+pub mod aedat4;
+pub mod csv;
 pub mod decode;
 pub mod encode;
 pub mod positions;
@@ -21,10 +23,14 @@ mod raw_header;
 mod raw_writer;
 mod recording;
 mod sniff;
+mod summary;
 mod words;
 
+pub use aedat4::{Aedat4Compression, Aedat4Writer};
+pub use csv::CsvWriter;
 pub use damage::Damage;
 pub use error::RecordError;
 pub use format::{Format, UnknownFormat};
 pub use raw_writer::Evt3Writer;
 pub use recording::{MAX_EVENTS_PER_READ, READ_BYTES, Recording};
+pub use summary::{GAP_US, PEAK_WINDOW_US, Summary};

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use evfocus_core::{Event, EventBatch, Geometry};
 
+use crate::aedat4::Aedat4Source;
+use crate::csv::CsvSource;
 use crate::decode::{DavisWordDecoder, Evt3Decoder};
 use crate::raw_header::{MAX_HEADER_BYTES, RawHeader};
 use crate::sniff::{Sniffed, sniff};
@@ -45,6 +47,8 @@ pub struct Recording {
 #[derive(Debug)]
 enum Source {
     Words(WordSource),
+    Aedat4(Aedat4Source),
+    Csv(CsvSource),
 }
 
 impl Recording {
@@ -81,20 +85,22 @@ impl Recording {
                 } else {
                     WordDecoder::evt2(header.geometry, header.origin_us)
                 };
-                (header.geometry, WordSource::new(file, header.data_start as u64, decoder))
+                let source = WordSource::new(file, header.data_start as u64, decoder).map_err(read_error)?;
+                (header.geometry, Source::Words(source))
             }
             Format::DavisWords => {
-                (Some(DavisWordDecoder::GEOMETRY), WordSource::new(file, 0, WordDecoder::davis()))
+                let source = WordSource::new(file, 0, WordDecoder::davis()).map_err(read_error)?;
+                (Some(DavisWordDecoder::GEOMETRY), Source::Words(source))
             }
-            Format::Aedat4 | Format::Csv => {
-                return Err(RecordError::Unrecognised {
-                    path: path.to_owned(),
-                    found: format.to_string(),
-                    remedy: String::from("not built yet"),
-                });
+            Format::Aedat4 => {
+                let source = Aedat4Source::open(path, file)?;
+                (source.geometry(), Source::Aedat4(source))
+            }
+            Format::Csv => {
+                let source = CsvSource::open(path, file, &start)?;
+                (source.geometry(), Source::Csv(source))
             }
         };
-        let source = Source::Words(source.map_err(read_error)?);
         let path = path.to_owned();
         Ok(Self { path, format, geometry, source, last_time: i64::MIN, time_reversals: 0 })
     }
@@ -129,6 +135,8 @@ impl Recording {
             Source::Words(source) => {
                 source.read(batch).map_err(|source| RecordError::Read { path: self.path.clone(), source })?
             }
+            Source::Aedat4(source) => source.read(&self.path, batch)?,
+            Source::Csv(source) => source.read(&self.path, batch)?,
         };
         self.count_reversals(&batch.events);
         Ok(more)
@@ -138,6 +146,8 @@ impl Recording {
     pub fn damage(&self) -> Damage {
         let damage = match &self.source {
             Source::Words(source) => source.damage(),
+            Source::Aedat4(source) => source.damage(),
+            Source::Csv(_) => Damage::default(),
         };
         Damage { time_reversals: self.time_reversals, ..damage }
     }
@@ -146,6 +156,7 @@ impl Recording {
     pub fn triggers(&self) -> Option<u64> {
         match &self.source {
             Source::Words(source) => Some(source.triggers()),
+            Source::Aedat4(_) | Source::Csv(_) => None,
         }
     }
 

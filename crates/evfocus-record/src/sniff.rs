@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::Format;
+use crate::csv::Layout;
 use crate::decode::looks_like_davis_words;
 use crate::raw_header::{Encoding, RawHeader};
 
@@ -31,7 +32,7 @@ pub(crate) fn sniff(path: &Path, start: &[u8]) -> Sniffed {
         return foreign(name, remedy);
     }
     if let Some(text) = as_text(start) {
-        return text_file(text);
+        return text_file(path, text);
     }
     let named_words = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("bin"));
     if (named_words || start.len() >= ENOUGH_DAVIS_BYTES) && looks_like_davis_words(start) {
@@ -100,7 +101,14 @@ fn as_text(start: &[u8]) -> Option<&str> {
     text.chars().all(is_text).then_some(text)
 }
 
-fn text_file(text: &str) -> Sniffed {
+/// Text is CSV if its first lines are; a file that is called CSV is taken at its word, so that the error names the line.
+fn text_file(path: &Path, text: &str) -> Sniffed {
+    let named = ["csv", "tsv", "txt"]
+        .iter()
+        .any(|name| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(name)));
+    if named || Layout::detect(text).is_ok() {
+        return Sniffed::Is(Format::Csv);
+    }
     let line: String = text.lines().next().unwrap_or_default().chars().take(60).collect();
     foreign(
         &format!("text that begins with {line:?}"),

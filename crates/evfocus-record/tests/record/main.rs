@@ -1,0 +1,18 @@
+//! Tests of evfocus-record from outside, in one binary.
+
+#[cfg(test)]
+mod common;
+#[cfg(test)]
+mod csv;
+#[cfg(test)]
+mod damaged;
+#[cfg(test)]
+mod foreign;
+#[cfg(test)]
+mod lossless;
+#[cfg(test)]
+mod positions;
+#[cfg(test)]
+mod recordings;
+#[cfg(test)]
+mod words;
