@@ -21,9 +21,9 @@ const SHORTEST_BASELINE_US: i64 = 1_000_000;
 const STEEPEST_DRIFT: f64 = 500e-6;
 /// Camera time may step back this far within ordinary disorder, microseconds.
 const DISORDER_US: i64 = 10_000;
-/// Camera time may run ahead of host time by this much between two observations before it must be a new time base: delay
-/// shrinks by at most what it was, and a link that buffers longer than this is unusable anyway. Microseconds.
-const LEAP_US: i64 = 1_000_000;
+/// A transfer that arrives this much earlier than the smallest delay seen so far allows comes from a new time base; smaller steps
+/// only mean that every transfer before was late. Microseconds.
+const LEAP_US: f64 = 1_000_000.0;
 
 /// What an observation told about the camera's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,8 +79,13 @@ struct Line {
 
 impl Line {
     fn offset_at(&self, camera_us: i64) -> f64 {
-        self.offset_us + self.slope * (camera_us - self.camera_us) as f64
+        self.offset_us + self.slope * camera_us.saturating_sub(self.camera_us) as f64
     }
+}
+
+/// From point `a` to point `b`, without overflow.
+fn difference(a: (i64, i64), b: (i64, i64)) -> (i128, i128) {
+    (i128::from(b.0) - i128::from(a.0), i128::from(b.1) - i128::from(a.1))
 }
 
 /// No camera time has been seen yet.
@@ -92,7 +97,9 @@ impl ClockMap {
     /// An empty map. `wrap_period`: after how long the camera's counter starts anew at zero, if the driver does not unwrap it.
     pub fn new(wrap_period: Option<Duration>) -> Self {
         Self {
-            wrap_period_us: wrap_period.and_then(|period| i64::try_from(period.as_micros()).ok()),
+            wrap_period_us: wrap_period
+                .and_then(|period| i64::try_from(period.as_micros()).ok())
+                .filter(|&period| period > 0),
             wraps: 0,
             last: None,
             envelope: VecDeque::with_capacity(BUCKETS + 1),
@@ -107,39 +114,36 @@ impl ClockMap {
 
     /// `raw` as a time that does not wrap, taken to lie within half a wrap period of the newest observation.
     pub fn unwrap_time(&self, raw: CameraMicros) -> CameraMicros {
-        let (Some(period), Some((last, _))) = (self.wrap_period_us, self.last) else {
-            return raw;
-        };
-        let near = raw.0.saturating_add(self.wraps.saturating_mul(period));
-        let distance = near.saturating_sub(last.0);
-        if distance < -period / 2 {
-            CameraMicros(near.saturating_add(period))
-        } else if distance > period / 2 {
-            CameraMicros(near.saturating_sub(period))
-        } else {
-            CameraMicros(near)
-        }
+        self.last.map_or(raw, |(last, _)| self.unwrap_near(raw, last).0)
+    }
+
+    /// `raw` with as many wrap periods added as bring it nearest to `expected`, and how many those are.
+    fn unwrap_near(&self, raw: CameraMicros, expected: CameraMicros) -> (CameraMicros, i64) {
+        let Some(period) = self.wrap_period_us else { return (raw, 0) };
+        let wraps = expected.micros_since(raw).saturating_add(period / 2).div_euclid(period);
+        (CameraMicros(raw.0.saturating_add(wraps.saturating_mul(period))), wraps)
     }
 
     /// Takes note that a transfer complete up to `raw` camera time arrived at `arrival`. Constant time, no allocation.
     pub fn observe(&mut self, raw: CameraMicros, arrival: HostMicros) -> ClockEvent {
-        let camera = self.unwrap_time(raw);
+        let mut camera = raw;
         let mut event = ClockEvent::Steady;
         if let Some((last, last_arrival)) = self.last {
-            let camera_step = camera.micros_since(last);
-            let host_step = arrival.micros_since(last_arrival);
-            if camera_step < -DISORDER_US || camera_step.saturating_sub(host_step) > LEAP_US {
+            // Host time tells how often the counter has wrapped while nothing arrived.
+            let waited = arrival.since(last_arrival);
+            let (unwrapped, wraps) = self.unwrap_near(raw, last + waited);
+            let early_us = self.line.offset_at(unwrapped.0) - arrival.0.saturating_sub(unwrapped.0) as f64;
+            if unwrapped.micros_since(last) < -DISORDER_US || early_us > LEAP_US {
                 self.restart();
                 event = ClockEvent::Reset;
-            } else if let Some(period) = self.wrap_period_us {
-                let wraps = (camera.0 - raw.0) / period;
-                if wraps != self.wraps {
+            } else {
+                camera = unwrapped;
+                if wraps > self.wraps {
                     self.wraps = wraps;
                     event = ClockEvent::Wrapped;
                 }
             }
         }
-        let camera = if event == ClockEvent::Reset { raw } else { camera };
         self.last = Some((camera, arrival));
         self.add(camera, arrival);
         event
@@ -165,10 +169,13 @@ impl ClockMap {
             }
             self.envelope.push_back(point);
             self.bucket_end = arrival + BUCKET;
-        } else if let Some(lowest) = self.envelope.back_mut()
-            && point.1 < lowest.1
-        {
-            *lowest = point;
+        } else if let Some(lowest) = self.envelope.back_mut() {
+            // Lowest with the drift taken out: within a bucket, 100 ppm are 10 us.
+            let line = self.line;
+            let height = |(camera, offset): (i64, i64)| offset as f64 - line.offset_at(camera);
+            if height(point) < height(*lowest) {
+                *lowest = point;
+            }
         }
         let above = point.1 as f64 - self.line.offset_at(point.0);
         if self.observations == 1 || above < 0.0 {
@@ -186,15 +193,16 @@ impl ClockMap {
         let (Some(&(first, _)), Some(&(last, _))) = (self.envelope.front(), self.envelope.back()) else {
             return;
         };
-        if last - first < SHORTEST_BASELINE_US {
+        if last.saturating_sub(first) < SHORTEST_BASELINE_US {
             return;
         }
         self.hull.clear();
         for &point in &self.envelope {
             while let [.., a, b] = self.hull.as_slice() {
-                let (ab, ap) = ((b.0 - a.0, b.1 - a.1), (point.0 - a.0, point.1 - a.1));
-                // 128-bit products: microseconds since 1970 squared do not fit 64 bits.
-                if i128::from(ab.0) * i128::from(ap.1) > i128::from(ap.0) * i128::from(ab.1) {
+                // 128 bits: microseconds since 1970 squared do not fit 64 bits.
+                let (ab_camera, ab_offset) = difference(*a, *b);
+                let (ap_camera, ap_offset) = difference(*a, point);
+                if ab_camera.saturating_mul(ap_offset) > ap_camera.saturating_mul(ab_offset) {
                     break;
                 }
                 self.hull.pop();
@@ -205,12 +213,13 @@ impl ClockMap {
                 _ => self.hull.push(point),
             }
         }
+        let since_first = |camera: i64| camera.saturating_sub(first) as f64;
         let count = self.envelope.len() as f64;
-        let mean = self.envelope.iter().map(|&(camera, _)| (camera - first) as f64).sum::<f64>() / count;
-        let edge = self.hull.windows(2).find(|edge| matches!(edge, [_, b] if (b.0 - first) as f64 >= mean));
+        let mean = self.envelope.iter().map(|&(camera, _)| since_first(camera)).sum::<f64>() / count;
+        let edge = self.hull.windows(2).find(|edge| matches!(edge, [_, b] if since_first(b.0) >= mean));
         if let Some(&[a, b]) = edge {
-            let slope = (b.1 - a.1) as f64 / (b.0 - a.0) as f64;
-            let slope = slope.clamp(-STEEPEST_DRIFT, STEEPEST_DRIFT);
+            let (camera, offset) = difference(a, b);
+            let slope = (offset as f64 / camera as f64).clamp(-STEEPEST_DRIFT, STEEPEST_DRIFT);
             self.line = Line { camera_us: a.0, offset_us: a.1 as f64, slope };
             let lowest = self
                 .envelope

@@ -428,6 +428,10 @@ impl Controller {
     }
 
     fn on_lens(&mut self, sample: LensSample, now: HostMicros, actions: &mut Vec<Action>) {
+        if !sample.position.0.is_finite() {
+            self.on_failure(Failure::LensFault, now, actions);
+            return;
+        }
         self.lens = Some(sample);
         self.lens_heard = now;
         match self.state {
@@ -502,7 +506,9 @@ impl Controller {
             self.on_failure(Failure::LensSilent, now, actions);
             return;
         }
-        if self.run.is_some() && now.since(self.camera_heard) >= self.config.silence_timeout {
+        // The way back after a failure needs no camera.
+        let needs_camera = self.run.is_some() && !matches!(self.state, State::Restoring { .. });
+        if needs_camera && now.since(self.camera_heard) >= self.config.silence_timeout {
             self.fail(Failure::CameraSilent, now, actions);
             return;
         }

@@ -163,7 +163,7 @@ impl CumulativeCounter {
             return;
         }
         self.close_newest();
-        let bin = (time.0 - self.origin_us) / self.bin_us;
+        let bin = time.0.saturating_sub(self.origin_us) / self.bin_us;
         // After a silence longer than the ring, every slot holds the same total: each needs to be written only once.
         let first = (self.newest + 1).max(bin.saturating_sub(self.mask as i64));
         for empty in first..=bin {

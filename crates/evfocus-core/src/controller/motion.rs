@@ -37,7 +37,9 @@ impl Motion {
         now: HostMicros,
         config: &ControllerConfig,
     ) -> Self {
-        let expected = Duration::from_secs_f64(from.distance(target) / speed.counts_per_second());
+        // A lens that says it is light years away gets no time beyond the slack.
+        let expected = from.distance(target) / speed.counts_per_second();
+        let expected = Duration::try_from_secs_f64(expected).unwrap_or_default();
         Self {
             from,
             target,
@@ -45,7 +47,7 @@ impl Motion {
             last_change: (now, from),
             moved: false,
             stall_timeout: config.stall_timeout,
-            deadline: now + expected * 2 + config.motion_slack,
+            deadline: now + expected.saturating_mul(2) + config.motion_slack,
         }
     }
 

@@ -230,10 +230,12 @@ impl Controller {
     /// Ends the run without focus: the lens goes back to where it was, or stops if it is the lens that failed.
     pub(super) fn fail(&mut self, failure: Failure, now: HostMicros, actions: &mut Vec<Action>) {
         let Some(before) = self.run.as_ref().map(|run| run.position_before) else { return };
-        // A failure on the way back does not hide the first one; the lens just stops.
+        // A failure on the way back does not hide the first one. The lens just stops; for the camera it is too late to matter.
         if let State::Restoring { failure: first, .. } = self.state {
-            actions.push(Action::StopLens);
-            self.finish(Outcome::Failed(first), now, actions);
+            if failure.is_of_lens() {
+                actions.push(Action::StopLens);
+                self.finish(Outcome::Failed(first), now, actions);
+            }
             return;
         }
         let go_back = self.config.on_failure == OnFailure::Restore
