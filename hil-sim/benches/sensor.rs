@@ -1,3 +1,4 @@
+#![expect(clippy::expect_used, reason = "a benchmark of broken devices means nothing")]
 //! How fast the simulated sensor is: each iteration simulates 100 ms, so a time of 25 ms is four times real time.
 
 use std::hint::black_box;
@@ -34,7 +35,7 @@ impl Bench {
         let sample = self.lens.sample().expect("a lens that works");
         if !sample.moving {
             let info = self.lens.info();
-            let middle = (info.range.min().0 + info.range.max().0) / 2.0;
+            let middle = f64::midpoint(info.range.min().0, info.range.max().0);
             let target = if sample.position.0 < middle { info.range.max() } else { info.range.min() };
             self.lens.move_to(target, info.max_speed).expect("a target in range");
         }

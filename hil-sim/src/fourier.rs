@@ -97,11 +97,13 @@ pub(crate) fn fast_size(least: usize) -> usize {
     let is_fast = |half: &usize| {
         let mut rest = *half;
         for factor in [2, 3, 5] {
-            while rest % factor == 0 {
+            while rest.is_multiple_of(factor) {
                 rest /= factor;
             }
         }
         rest == 1
     };
-    2 * (least.div_ceil(2).max(1)..).find(is_fast).unwrap_or(least)
+    let half = least.div_ceil(2).max(1);
+    // A power of two lies within every such range.
+    2 * (half..=2 * half).find(is_fast).unwrap_or(half)
 }

@@ -9,6 +9,7 @@ mod profile;
 mod state;
 mod trajectory;
 
+use std::cell::Cell;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
@@ -29,6 +30,8 @@ pub struct SimLens {
     clock: Arc<dyn Clock>,
     epoch: HostMicros,
     serial: String,
+    /// Whether this handle has noticed that the lens was unplugged: it stays dead, as a file handle would.
+    gone: Cell<bool>,
 }
 
 impl std::fmt::Debug for SimLens {
@@ -49,12 +52,12 @@ impl SimLens {
         epoch: HostMicros,
         serial: String,
     ) -> Self {
-        Self { state, clock, epoch, serial }
+        Self { state, clock, epoch, serial, gone: Cell::new(false) }
     }
 
     /// Seconds since the rig was made.
     fn seconds(&self, time: HostMicros) -> f64 {
-        time.micros_since(self.epoch) as f64 * 1e-6
+        time.micros_since(self.epoch) as f64 / 1e6
     }
 
     fn error(&self, kind: DeviceErrorKind, what: String) -> DeviceError {
@@ -72,7 +75,8 @@ impl SimLens {
             // Read under the lock: the sensor never sees a command that is older than what it has already computed.
             let now = self.clock.now();
             let seconds = self.seconds(now);
-            if state.unplugged(seconds) {
+            if self.gone.get() || state.unplugged(seconds) {
+                self.gone.set(true);
                 return Err(self
                     .error(DeviceErrorKind::Disconnected, format!("cannot {what}: the lens is unplugged")));
             }

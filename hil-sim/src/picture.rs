@@ -36,13 +36,13 @@ pub(crate) struct Scratch {
 }
 
 impl Picture {
-    pub(crate) fn new(config: &RigConfig) -> Self {
+    pub(crate) fn new(config: RigConfig) -> Self {
         let geometry = config.sensor.geometry;
         let (width, height) = (usize::from(geometry.width), usize::from(geometry.height));
         Self {
             planes: OnceLock::new(),
             motion: Motion::new(&config.motion, &mut Stream::Shake.generator(config.seed)),
-            config: config.clone(),
+            config,
             width,
             height,
         }

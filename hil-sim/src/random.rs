@@ -13,7 +13,7 @@ pub(crate) enum Stream {
     Mismatch,
     Noise,
     Shake,
-    Delivery,
+    Transfers,
     LensReadOut,
 }
 

@@ -36,7 +36,7 @@ impl Rig {
         config.validate()?;
         let epoch = clock.now();
         let lens = LensState::new(config.lens, &config.faults, Stream::LensReadOut.generator(config.seed));
-        Ok(Self { picture: Arc::new(Picture::new(&config)), lens: Arc::new(Mutex::new(lens)), clock, epoch })
+        Ok(Self { picture: Arc::new(Picture::new(config)), lens: Arc::new(Mutex::new(lens)), clock, epoch })
     }
 
     /// Opens the camera and the lens. Opening them again, after a fault and [`repair`](Self::repair), gives handles to the
@@ -96,6 +96,6 @@ impl Rig {
     }
 
     fn seconds(&self, time: HostMicros) -> f64 {
-        time.micros_since(self.epoch) as f64 * 1e-6
+        time.micros_since(self.epoch) as f64 / 1e6
     }
 }

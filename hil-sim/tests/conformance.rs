@@ -7,7 +7,7 @@ use evfocus_core::{CameraMicros, EventBatch, HostMicros, LensPosition, LensSampl
 use evfocus_hal::{
     Camera, CameraInfo, Clock, DeviceError, DeviceErrorKind, Lens, LensInfo, VirtualClock, conformance,
 };
-use hil_sim::{CameraModel, LensConfig, Light, MotionConfig, Rig, RigConfig, SimCamera, SimLens};
+use hil_sim::{LensConfig, Light, MotionConfig, Rig, RigConfig, SimCamera, SimLens};
 
 use crate::sweep::section_three;
 
@@ -24,10 +24,7 @@ fn shaken() -> RigConfig {
 #[test]
 fn simulated_cameras_conform() {
     for light in [Light::Light, Light::Dark] {
-        let config = RigConfig {
-            motion: MotionConfig::hand_held(),
-            ..RigConfig::preset(CameraModel::Davis346, light)
-        };
+        let config = RigConfig { motion: MotionConfig::hand_held(), ..section_three(light) };
         conformance::camera(|| {
             let (camera, _, clock) = open(&config);
             (Box::new(camera), clock)
@@ -107,7 +104,7 @@ impl Camera for BadCamera {
                 batch.events.splice(0..0, before);
             }
             CameraVice::OverstaysTheTimeout => {
-                self.clock.sleep_until(self.clock.now() + Duration::from_secs(1))
+                self.clock.sleep_until(self.clock.now() + Duration::from_secs(1));
             }
             CameraVice::TimesGoBack => batch.events.reverse(),
             CameraVice::PixelOffTheSensor => {
@@ -193,11 +190,7 @@ impl Lens for BadLens {
                 return self.inner.move_to(short, speed);
             }
             LensVice::RacesAlways => return self.inner.move_to(target, info.max_speed),
-            LensVice::FinishesTheOldMove => {
-                if self.inner.sample()?.moving {
-                    return Ok(());
-                }
-            }
+            LensVice::FinishesTheOldMove if self.inner.sample()?.moving => return Ok(()),
             _ => {}
         }
         self.inner.move_to(target, speed)?;

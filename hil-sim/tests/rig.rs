@@ -1,5 +1,17 @@
 //! Tests of the simulated rig from outside, all in virtual time.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::wildcard_enum_match_arm,
+    reason = "a failed unwrap is a failed test, and the figures belong in its output"
+)]
+
+mod configuration;
 mod conformance;
+mod faults;
+mod lens;
 mod physics;
+mod repeat;
+mod sensor;
 mod sweep;

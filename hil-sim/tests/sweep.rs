@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use evfocus_core::{Event, EventBatch, Geometry, HostMicros};
 use evfocus_hal::{Camera, Clock, Lens, VirtualClock};
-use hil_sim::{CameraModel, Light, LinkConfig, OpticsConfig, Rig, RigConfig, SensorConfig};
+use hil_sim::{
+    CameraModel, Light, LinkConfig, OpticsConfig, Rig, RigConfig, SensorConfig, SimCamera, SimLens,
+};
 
 /// The set-up of section 3: see the module that uses it.
 pub(crate) fn section_three(light: Light) -> RigConfig {
@@ -63,6 +65,19 @@ impl SweepCurve {
         best.unwrap()
     }
 
+    /// Centre of the hump between `low` and `high`: the centroid of the bins within 10 % of its highest.
+    pub(crate) fn hump(&self, low: f64, high: f64) -> f64 {
+        let least = f64::from(self.peak(low, high).1) * 0.9;
+        let bins =
+            (0..self.offsets.len()).filter(|&bin| self.offsets[bin] >= low && self.offsets[bin] < high);
+        let (sum, weight) =
+            bins.filter(|&bin| f64::from(self.total(bin)) >= least).fold((0.0, 0.0), |sums, bin| {
+                let total = f64::from(self.total(bin));
+                (sums.0 + self.offsets[bin] * total, sums.1 + total)
+            });
+        sum / weight
+    }
+
     /// Share of ON among the events with offsets in `low..high`.
     pub(crate) fn on_share(&self, low: f64, high: f64) -> f64 {
         let bins =
@@ -97,9 +112,7 @@ impl fmt::Display for SweepCurve {
 /// Sweeps the rig's lens through its range. Positions are the glass's true ones at the events' times (the link's clock must
 /// be the host's).
 pub(crate) fn sweep_curve(config: &RigConfig) -> SweepCurve {
-    let clock = Arc::new(VirtualClock::new());
-    let rig = Rig::new(config.clone(), Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
-    let (mut camera, mut lens) = rig.devices();
+    let (rig, mut camera, mut lens, clock) = open(config);
     camera.start().unwrap();
     let info = lens.info();
     lens.move_to(info.range.max(), info.max_speed).unwrap();
@@ -124,12 +137,26 @@ pub(crate) fn sweep_curve(config: &RigConfig) -> SweepCurve {
 
 /// All events that arrive within `duration`.
 pub(crate) fn run(camera: &mut dyn Camera, clock: &dyn Clock, duration: Duration) -> Vec<Event> {
+    watch(camera, clock, duration).0
+}
+
+/// The same, with the number of events that were lost.
+pub(crate) fn watch(camera: &mut dyn Camera, clock: &dyn Clock, duration: Duration) -> (Vec<Event>, u64) {
     let end = clock.now() + duration;
     let mut batch = EventBatch::with_capacity(100_000);
-    let mut events = Vec::new();
+    let (mut events, mut lost) = (Vec::new(), 0);
     while clock.now() < end {
         camera.read(&mut batch, end.since(clock.now())).unwrap();
         events.extend_from_slice(&batch.events);
+        lost += batch.lost;
     }
-    events
+    (events, lost)
+}
+
+/// A rig on a virtual clock, its devices and the clock.
+pub(crate) fn open(config: &RigConfig) -> (Rig, SimCamera, SimLens, Arc<VirtualClock>) {
+    let clock = Arc::new(VirtualClock::new());
+    let rig = Rig::new(config.clone(), Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
+    let (camera, lens) = rig.devices();
+    (rig, camera, lens, clock)
 }

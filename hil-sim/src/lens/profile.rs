@@ -75,11 +75,12 @@ pub(super) fn travel(
 
 /// Appends a phase unless it is empty; returns the position at its end.
 fn push(phases: &mut Vec<Phase>, position: f64, velocity: f64, acceleration: f64, duration: f64) -> f64 {
-    // The negated comparison also drops the NaN of a motor at rest told to stay where it is (0 / 0).
-    if !(duration > 0.0) {
-        return position;
+    // The NaN of a motor at rest that is told to stay where it is (0 / 0) is not above zero either.
+    if duration > 0.0 {
+        let phase = Phase { position, velocity, acceleration, duration };
+        phases.push(phase);
+        phase.end()
+    } else {
+        position
     }
-    let phase = Phase { position, velocity, acceleration, duration };
-    phases.push(phase);
-    phase.end()
 }

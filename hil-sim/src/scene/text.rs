@@ -39,7 +39,7 @@ pub(super) fn page(canvas: &mut Texture, rng: &mut Xoshiro256PlusPlus) {
         while left + 5 * dot + margin <= canvas.width {
             // One place in six stays empty, as between words.
             if rng.random_range(0..6) > 0 {
-                letter(canvas, (left, top), dot, &LETTERS[rng.random_range(0..LETTERS.len())]);
+                letter(canvas, (left, top), dot, LETTERS[rng.random_range(0..LETTERS.len())]);
             }
             left += 6 * dot;
         }
@@ -47,8 +47,8 @@ pub(super) fn page(canvas: &mut Texture, rng: &mut Xoshiro256PlusPlus) {
     }
 }
 
-fn letter(canvas: &mut Texture, (left, top): (usize, usize), dot: usize, rows: &[u8; 7]) {
-    for (row, bits) in rows.iter().enumerate() {
+fn letter(canvas: &mut Texture, (left, top): (usize, usize), dot: usize, rows: [u8; 7]) {
+    for (row, bits) in rows.into_iter().enumerate() {
         for column in (0..5).filter(|column| bits & (0x10 >> column) != 0) {
             for y in top + row * dot..top + (row + 1) * dot {
                 let start = y * canvas.width + left + column * dot;

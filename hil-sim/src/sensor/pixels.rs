@@ -69,12 +69,12 @@ impl Pixels {
             let leak_hz = config.leak_hz * 10_f64.powf(config.leak_spread_decades * decades);
             let level = log_intensity(intensity);
             // After a long time before the scene the memory lies anywhere between the thresholds.
-            let memory = level + on - rng.random::<f32>() * (on + off);
+            let memory = level - on + rng.random::<f32>() * (on + off);
             pixels.level[index] = level;
             pixels.on_threshold[index] = on;
             pixels.off_threshold[index] = off;
-            pixels.upper[index] = memory.max(level - off) + on;
-            pixels.lower[index] = memory.max(level - off) - off;
+            pixels.upper[index] = memory + on;
+            pixels.lower[index] = memory - off;
             pixels.leak[index] = (leak_hz * f64::from(on) * step * LEAK_STEPS as f64) as f32;
         }
         pixels
@@ -112,14 +112,11 @@ impl Pixels {
                     *lower -= leak;
                 }
             }
-            let light = match image.get(range.clone()) {
-                Some(light) => light,
-                None => {
-                    let rest = &image[first..];
-                    padding[..rest.len()].copy_from_slice(rest);
-                    &padding[..]
-                }
-            };
+            let light = image.get(range.clone()).unwrap_or_else(|| {
+                let rest = &image[first..];
+                padding[..rest.len()].copy_from_slice(rest);
+                &padding
+            });
             let mut before = [0.0; LANES];
             let level = &mut self.level[range.clone()];
             before.copy_from_slice(level);

@@ -74,9 +74,8 @@ impl ReadOut {
             self.free_micros = start + self.service_micros;
             self.queue.push_back(Spike { micros: start as i64, ..spike });
         }
-        while let Some(spike) = self.queue.pop_front_if(|spike| spike.micros < end) {
-            out.push(spike);
-        }
+        let due = self.queue.partition_point(|spike| spike.micros < end);
+        out.extend(self.queue.drain(..due));
         lost
     }
 
