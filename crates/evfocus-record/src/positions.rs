@@ -15,8 +15,8 @@ use crate::RecordError;
 pub const HEADER: &str = "t_us,position";
 /// Fewer samples say nothing about a motion.
 pub const MIN_SAMPLES: usize = 2;
-/// Larger files are no positions files: this is a day at one sample a millisecond.
-pub const MAX_BYTES: u64 = 2 << 30;
+/// Larger files are no positions files: this is more than an hour at one sample a millisecond.
+pub const MAX_BYTES: u64 = 64 << 20;
 
 /// Reads the positions at `path`. [`LensTrace::first`], [`LensTrace::last`] and [`LensTrace::extent`] tell what they cover.
 ///

@@ -114,10 +114,11 @@ impl Tally {
         self.window(t);
     }
 
-    /// Counts the event in its window; one that goes back in time counts in the window under way.
+    /// Counts the event in its window. One that is a little late counts in the window under way; after a step back by more
+    /// than a window (a reset of the clock) windows begin anew.
     fn window(&mut self, t: i64) {
         let windows = t.saturating_sub(self.window_start) / PEAK_WINDOW_US;
-        if windows > 0 {
+        if windows != 0 {
             self.window_start = self.window_start.saturating_add(windows.saturating_mul(PEAK_WINDOW_US));
             self.window_events = 0;
         }

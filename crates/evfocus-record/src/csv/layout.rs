@@ -183,9 +183,7 @@ impl Layout {
     fn without_header(separator: Separator, first: &str, samples: &[&str]) -> Result<Self, String> {
         let lines = || std::iter::once(first).chain(samples.iter().copied());
         if separator.split(first).count() != 4 {
-            return Err(String::from(
-                "without a header there must be four columns; add one such as \"t_us,x,y,p\"",
-            ));
+            return Err(String::from("without a header there must be four columns"));
         }
         let candidate = |time, x, y, polarity| {
             let lines: Vec<&str> = lines().collect();
@@ -196,12 +194,8 @@ impl Layout {
         let candidates = [candidate(3, 0, 1, 2), candidate(0, 1, 2, 3)];
         match candidates {
             [Some(layout), None] | [None, Some(layout)] => Ok(layout),
-            [None, None] => Err(String::from(
-                "the first lines are neither x,y,p,t nor t,x,y,p; add a header such as \"t_us,x,y,p\"",
-            )),
-            [Some(_), Some(_)] => Err(String::from(
-                "the first lines may be x,y,p,t as well as t,x,y,p; add a header such as \"t_us,x,y,p\"",
-            )),
+            [None, None] => Err(String::from("the first lines are neither x,y,p,t nor t,x,y,p")),
+            [Some(_), Some(_)] => Err(String::from("the first lines may be x,y,p,t as well as t,x,y,p")),
         }
     }
 

@@ -37,7 +37,7 @@ impl CsvSource {
                 line: error.line,
                 what: error.what,
                 text: shortened(text.unwrap_or_default()),
-                remedy: "see the documentation of CSV recordings for the columns",
+                remedy: "begin the file with a line such as t_us,x,y,p",
             }
         })?;
         let file = BufReader::with_capacity(READ_BYTES, file);

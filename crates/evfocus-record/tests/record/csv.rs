@@ -46,7 +46,10 @@ fn without_a_header_the_lines_decide_if_they_can() {
     assert_eq!(events("1.500000 3 4 1\n2.000001 5 6 0\n"), expected);
     let (line, message) = error("1,0,1,1\n1,1,1,1\n");
     assert_eq!(line, 1);
-    assert!(message.contains("add a header"), "{message}");
+    assert!(
+        message.contains("may be x,y,p,t as well as t,x,y,p") && message.contains("begin the file with"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -15,4 +15,6 @@ mod positions;
 #[cfg(test)]
 mod recordings;
 #[cfg(test)]
+mod summary;
+#[cfg(test)]
 mod words;
