@@ -18,6 +18,8 @@ EVT3_PERIOD_US = 1 << 24
 # Events in an order that no writer may change: equal times, descending columns, runs for vectors, long silences.
 MADE_EVENTS = 20_000
 MADE_SENSOR = (640, 480)
+# Events that dv-processing writes with each of its compressions.
+DV_EVENTS = 30_000
 
 COLUMNS = ("t", "x", "y", "p")
 
@@ -102,6 +104,20 @@ def write_evt2(path, events):
     path.write_bytes(header.encode() + words.tobytes())
 
 
+def write_dv(path, events, compression):
+    """The first events, written by iniVation's library."""
+    import dv_processing
+
+    config = dv_processing.io.MonoCameraWriter.Config("DAVIS346_00000002")
+    config.compression = getattr(dv_processing.CompressionType, compression)
+    config.addEventStream((346, 260))
+    writer = dv_processing.io.MonoCameraWriter(str(path), config)
+    store = dv_processing.EventStore()
+    for t, x, y, p in zip(*(events[name].tolist() for name in COLUMNS)):
+        store.push_back(t, x, y, bool(p))
+    writer.writeEvents(store)
+
+
 def main():
     convert, data, work = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
     made = work / "made.csv"
@@ -147,6 +163,12 @@ def main():
     ours = read_csv(work / "made.evt2.csv")
     check("made.evt2.raw, read by us, against what was written", written, lambda _: ours, evt2)
     check("made.evt2.raw, read by us and by evlib", ours, read_evlib, evt2)
+    davis = {name: column[:DV_EVENTS] for name, column in read_csv(work / "davis346_events.written.csv").items()}
+    for compression in ("NONE", "LZ4", "LZ4_HIGH", "ZSTD", "ZSTD_HIGH"):
+        dv = work / f"dv.{compression}.aedat4"
+        write_dv(dv, davis, compression)
+        subprocess.run([convert, dv, work / "dv.csv"], check=True)
+        check(f"AEDAT4 {compression}, written by dv-processing, read by us", davis, lambda _: read_csv(work / "dv.csv"), dv)
     if failures:
         sys.exit(f"{failures} checks failed")
 

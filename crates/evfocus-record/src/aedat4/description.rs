@@ -15,9 +15,10 @@ pub(super) fn first_event_stream(xml: &str) -> Option<EventStream> {
     let mut found: Option<i32> = None;
     let (mut width, mut height) = (None, None);
     for (path, key, value) in Attributes::new(xml) {
-        // "/outInfo/0/" or "/outInfo/0/info/".
-        let mut parts = path.trim_matches('/').split('/');
-        let (Some("outInfo"), Some(id), part) = (parts.next(), parts.next(), parts.next()) else { continue };
+        // "/outInfo/0/" or "/outInfo/0/info/"; dv-gui puts the name of its module before: "/mainloop/Recorder/outInfo/0/".
+        let mut parts =
+            path.split('/').skip_while(|part| *part != "outInfo").skip(1).filter(|part| !part.is_empty());
+        let (Some(id), part) = (parts.next(), parts.next()) else { continue };
         let Ok(id) = id.parse::<i32>() else { continue };
         match (part, key) {
             (None, "typeIdentifier") if value == "EVTS" && found.is_none() => found = Some(id),
@@ -70,4 +71,40 @@ impl<'a> Iterator for Attributes<'a> {
 fn quoted<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     let (_, from_value) = tag.split_once(name)?;
     from_value.split_once('"').map(|(value, _)| value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dv_gui_puts_its_modules_before_the_streams() {
+        let xml = r#"<dv version="2.0"><node name="outInfo" path="/mainloop/Recorder/outInfo/">
+            <node name="0" path="/mainloop/Recorder/outInfo/0/">
+                <attr key="typeIdentifier" type="string">FRME</attr>
+                <node name="info" path="/mainloop/Recorder/outInfo/0/info/"><attr key="sizeX" type="int">9</attr></node>
+            </node>
+            <node name="3" path="/mainloop/Recorder/outInfo/3/">
+                <attr key="typeIdentifier" type="string">EVTS</attr>
+                <node name="info" path="/mainloop/Recorder/outInfo/3/info/">
+                    <attr key="sizeX" type="int">346</attr>
+                    <attr key="sizeY" type="int">260</attr>
+                </node>
+            </node></node></dv>"#;
+        let geometry = Some(Geometry { width: 346, height: 260 });
+        assert_eq!(first_event_stream(xml), Some(EventStream { id: 3, geometry }));
+    }
+
+    #[test]
+    fn text_that_is_no_description_names_no_stream() {
+        for xml in [
+            "",
+            "<",
+            "<node path=\"/outInfo/0/\">",
+            "<attr key=\"typeIdentifier\">EVTS</attr>",
+            "<node path=\"/outInfo/x/\"><attr key=\"typeIdentifier\">EVTS<",
+        ] {
+            assert_eq!(first_event_stream(xml), None, "{xml:?}");
+        }
+    }
 }

@@ -54,7 +54,12 @@ fn ends(path: &Path, format: Option<Format>) {
 
 /// One of the real recordings.
 fn real() -> impl Strategy<Value = Vec<u8>> {
-    let names = ["evt3_hd_1280x720_trigger.raw", "davis346_events.aedat4", "davis346_usb_words_made.bin"];
+    let names = [
+        "evt3_hd_1280x720_trigger.raw",
+        "davis346_events.aedat4",
+        "davis346_events_zstd.aedat4",
+        "davis346_usb_words_made.bin",
+    ];
     prop::sample::select(names.to_vec()).prop_map(|name| {
         let mut bytes = std::fs::read(data(name)).unwrap();
         bytes.truncate(60_000);

@@ -48,6 +48,12 @@ fn aedat4_of_a_davis346() {
 }
 
 #[test]
+fn aedat4_compressed_with_zstd() {
+    let events = read_file(&data("davis346_events_zstd.aedat4"), None);
+    assert_eq!(events, davis_events()[..4000]);
+}
+
+#[test]
 fn csv_of_a_davis346() {
     let events = davis_events();
     let mut text = String::from("t,x,y,p\n");
