@@ -35,7 +35,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects to the daemon's socket, for instance [`DEFAULT_SOCKET`](crate::DEFAULT_SOCKET).
+    /// Connects to the daemon's socket.
     ///
     /// # Errors
     /// One variant for each thing to do about it, see [`ClientError`].

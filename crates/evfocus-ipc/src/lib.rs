@@ -37,6 +37,3 @@ pub const INTERFACE: &str = "org.evfocus.Controller";
 
 /// The interface description, as `org.varlink.service.GetInterfaceDescription` answers it.
 pub const DESCRIPTION: &str = include_str!("org.evfocus.Controller.varlink");
-
-/// Where the daemon's socket is unless the configuration says otherwise.
-pub const DEFAULT_SOCKET: &str = "/run/evfocus/evfocus.sock";

@@ -3,17 +3,14 @@
 
 #![expect(clippy::panic, reason = "a test's helper")]
 
-#[path = "support/plain.rs"]
-mod plain;
-
 use std::future::Future;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use super::plain::{hear, hear_one, limits, say, serve};
 use evfocus_ipc::client::{Client, ClientError};
 use evfocus_ipc::server::Limits;
 use evfocus_ipc::{Error, FocusRequest};
-use plain::{hear, hear_one, limits, say, serve};
 use tokio::io::AsyncWriteExt;
 use tokio::net::UnixStream;
 
