@@ -1,7 +1,7 @@
 //! Host time: the system's monotonic clock, and a clock that a simulation moves.
 
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use evfocus_core::HostMicros;
 
@@ -41,6 +41,12 @@ impl Clock for SystemClock {
             std::thread::sleep(wait);
         }
     }
+}
+
+/// The date: time since the beginning of 1970 (UTC). For records only; it may jump.
+#[expect(clippy::disallowed_methods, reason = "this is the one place where the date is read")]
+pub fn unix_time() -> Duration {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }
 
 /// A clock that stands still until somebody sleeps on it or advances it.

@@ -11,6 +11,6 @@ mod error;
 mod lens;
 
 pub use camera::{Camera, CameraInfo};
-pub use clock::{Clock, SystemClock, VirtualClock};
+pub use clock::{Clock, SystemClock, VirtualClock, unix_time};
 pub use error::{DeviceError, DeviceErrorKind};
 pub use lens::{Lens, LensInfo};

@@ -1,1 +1,19 @@
-//! Placeholder.
+//! The evfocus daemon: it reads the camera, polls and moves the lens, feeds the controller, and serves the socket.
+//!
+//! Not its job: deciding anything about focus (evfocus-core), speaking a device's protocol (the driver crates), or judging results.
+
+pub mod arguments;
+pub mod config;
+pub mod daemon;
+pub mod devices;
+pub mod handle;
+pub mod logging;
+mod publisher;
+mod reports;
+pub mod service;
+mod threads;
+pub mod virtual_rig;
+mod wire;
+
+pub use config::{Config, ConfigError};
+pub use virtual_rig::{VirtualRig, VirtualRigError};

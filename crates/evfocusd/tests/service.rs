@@ -194,5 +194,7 @@ async fn until(condition: impl Fn() -> bool) {
             tokio::task::yield_now().await;
         }
     };
-    tokio::time::timeout(std::time::Duration::from_secs(30), holds).await.unwrap_or_else(|_| panic!("waited in vain"));
+    tokio::time::timeout(std::time::Duration::from_secs(30), holds)
+        .await
+        .unwrap_or_else(|_| panic!("waited in vain"));
 }

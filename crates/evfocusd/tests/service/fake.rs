@@ -75,7 +75,12 @@ impl Rig {
             ..Status::default()
         }));
         let (progress, _) = broadcast::channel(BACKLOG);
-        let fake = Fake { state: Arc::default(), status: Arc::new(status_sender), progress, unanswered: Arc::default() };
+        let fake = Fake {
+            state: Arc::default(),
+            status: Arc::new(status_sender),
+            progress,
+            unanswered: Arc::default(),
+        };
         let handle = Handle {
             commands,
             status,

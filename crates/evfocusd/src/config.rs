@@ -1,0 +1,291 @@
+//! The configuration file: what users write, and what it means once it has been checked.
+
+mod focus;
+mod simulation;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use evfocus_core::LensPosition;
+use evfocus_core::controller::Mode;
+use serde::Deserialize;
+
+pub use focus::FocusSection;
+pub use simulation::{FaultSection, SimulationSection};
+
+/// The file as written. Every key has a default; no file at all is the simulated rig.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConfigFile {
+    /// The daemon itself.
+    pub daemon: DaemonSection,
+    /// The camera.
+    pub camera: CameraSection,
+    /// The lens.
+    pub lens: LensSection,
+    /// How to focus.
+    pub focus: FocusSection,
+    /// The simulated rig, for what is simulated.
+    pub simulation: SimulationSection,
+}
+
+/// `[daemon]`
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DaemonSection {
+    /// Where to listen; absent: see [`default_socket`].
+    pub socket: Option<PathBuf>,
+    /// Where to keep reports; absent: see [`default_state_dir`].
+    pub state_dir: Option<PathBuf>,
+    /// How many reports to keep; the oldest go first. 1 to 1,000,000.
+    pub reports_kept: u32,
+    /// `auto`: focus runs when triggered; `manual`: the caller moves the lens.
+    pub mode: String,
+}
+
+impl Default for DaemonSection {
+    fn default() -> Self {
+        Self { socket: None, state_dir: None, reports_kept: 1000, mode: "auto".to_owned() }
+    }
+}
+
+/// `[camera]`
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CameraSection {
+    /// `simulated`.
+    pub backend: String,
+}
+
+impl Default for CameraSection {
+    fn default() -> Self {
+        Self { backend: "simulated".to_owned() }
+    }
+}
+
+/// `[lens]`
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LensSection {
+    /// `simulated`.
+    pub backend: String,
+    /// The lowest position the lens may be sent to, counts; absent: the lens's own.
+    pub min_counts: Option<f64>,
+    /// The highest; absent: the lens's own.
+    pub max_counts: Option<f64>,
+    /// How often the lens is asked where it is, milliseconds; 0.5 to 1000.
+    pub poll_ms: f64,
+}
+
+impl Default for LensSection {
+    fn default() -> Self {
+        Self { backend: "simulated".to_owned(), min_counts: None, max_counts: None, poll_ms: 2.0 }
+    }
+}
+
+/// The configuration, checked.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Where to listen.
+    pub socket: PathBuf,
+    /// Where to keep reports.
+    pub state_dir: PathBuf,
+    /// How many reports to keep.
+    pub reports_kept: usize,
+    /// The mode to start in.
+    pub mode: Mode,
+    /// How often the lens is asked where it is.
+    pub lens_poll: Duration,
+    /// The positions the lens may be sent to, where they are narrower than its own.
+    pub lens_min: Option<LensPosition>,
+    /// See [`lens_min`](Self::lens_min).
+    pub lens_max: Option<LensPosition>,
+    /// How to focus.
+    pub focus: FocusSection,
+    /// The simulated rig.
+    pub rig: hil_sim::RigConfig,
+}
+
+/// What is wrong with a configuration.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read the configuration {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not the TOML that is expected; the parser's words name line, column and key.
+    #[error("{}: {source}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Line, column, key.
+        source: Box<toml::de::Error>,
+    },
+    /// A value that makes no sense.
+    #[error("{}: {key} is {value}: {remedy}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The key with its section.
+        key: String,
+        /// The value given.
+        value: String,
+        /// What it must be.
+        remedy: String,
+    },
+}
+
+/// A value that makes no sense, before it is known which file it came from.
+#[derive(Debug)]
+pub(crate) struct BadValue {
+    key: String,
+    value: String,
+    remedy: String,
+}
+
+impl std::fmt::Display for BadValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} is {}: {}", self.key, self.value, self.remedy)
+    }
+}
+
+impl BadValue {
+    pub(crate) fn new(key: impl Into<String>, value: impl ToString, remedy: impl Into<String>) -> Self {
+        Self { key: key.into(), value: value.to_string(), remedy: remedy.into() }
+    }
+
+    /// `value`, if it lies within `min` and `max`.
+    pub(crate) fn check(key: &str, value: f64, min: f64, max: f64) -> Result<f64, Self> {
+        if value >= min && value <= max {
+            Ok(value)
+        } else {
+            Err(Self::new(key, value, format!("it must be from {min} to {max}")))
+        }
+    }
+
+    /// A duration from a number of `unit_s` seconds each.
+    pub(crate) fn duration(key: &str, value: f64, unit_s: f64, min: f64, max: f64) -> Result<Duration, Self> {
+        Ok(Duration::from_secs_f64(Self::check(key, value, min, max)? * unit_s))
+    }
+}
+
+impl Config {
+    /// The configuration in the file at `path`.
+    ///
+    /// # Errors
+    /// [`ConfigError`], naming the file, the key, the value and what it must be.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// The configuration in `text`, which came from `path`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
+        let file: ConfigFile = toml::from_str(text)
+            .map_err(|source| ConfigError::Syntax { path: path.to_owned(), source: Box::new(source) })?;
+        Self::check(file).map_err(|bad| ConfigError::Value {
+            path: path.to_owned(),
+            key: bad.key,
+            value: bad.value,
+            remedy: bad.remedy,
+        })
+    }
+
+    /// The simulated rig with every default.
+    ///
+    /// # Errors
+    /// None; the defaults are checked by the same code as a file.
+    pub fn simulated() -> Result<Self, ConfigError> {
+        Self::parse("", Path::new("(no configuration file)"))
+    }
+
+    fn check(file: ConfigFile) -> Result<Self, BadValue> {
+        let backends = [("camera.backend", &file.camera.backend), ("lens.backend", &file.lens.backend)];
+        for (key, backend) in backends {
+            if backend != "simulated" {
+                return Err(BadValue::new(key, backend, "this version knows only \"simulated\""));
+            }
+        }
+        let mode = match file.daemon.mode.as_str() {
+            "auto" => Mode::Auto,
+            "manual" => Mode::Manual,
+            other => return Err(BadValue::new("daemon.mode", other, "it must be \"auto\" or \"manual\"")),
+        };
+        let reports = f64::from(file.daemon.reports_kept);
+        BadValue::check("daemon.reports_kept", reports, 1.0, 1e6)?;
+        let (min, max) = (file.lens.min_counts, file.lens.max_counts);
+        for (key, limit) in [("lens.min_counts", min), ("lens.max_counts", max)] {
+            if let Some(value) = limit.filter(|value| !value.is_finite()) {
+                return Err(BadValue::new(key, value, "it must be a number of lens counts"));
+            }
+        }
+        if let (Some(min), Some(max)) = (min, max)
+            && min >= max
+        {
+            return Err(BadValue::new(
+                "lens.min_counts",
+                min,
+                format!("it must lie below lens.max_counts, {max}"),
+            ));
+        }
+        let config = Self {
+            socket: file.daemon.socket.unwrap_or_else(default_socket),
+            state_dir: file.daemon.state_dir.unwrap_or_else(default_state_dir),
+            reports_kept: file.daemon.reports_kept as usize,
+            mode,
+            lens_poll: BadValue::duration("lens.poll_ms", file.lens.poll_ms, 1e-3, 0.5, 1000.0)?,
+            lens_min: min.map(LensPosition),
+            lens_max: max.map(LensPosition),
+            rig: file.simulation.rig()?,
+            focus: file.focus,
+        };
+        // Against the simulated lens now rather than at the first run.
+        config.controller(&hil_sim_lens(&config.rig))?;
+        Ok(config)
+    }
+
+    /// The controller's settings for `lens`.
+    pub(crate) fn controller(
+        &self,
+        lens: &evfocus_hal::LensInfo,
+    ) -> Result<evfocus_core::ControllerConfig, BadValue> {
+        self.focus.controller(lens, self.lens_min, self.lens_max)
+    }
+}
+
+fn hil_sim_lens(rig: &hil_sim::RigConfig) -> evfocus_hal::LensInfo {
+    evfocus_hal::LensInfo {
+        model: String::new(),
+        serial: String::new(),
+        range: rig.lens.range,
+        max_speed: rig.lens.max_speed,
+        needs_homing: rig.lens.needs_homing,
+    }
+}
+
+/// `$EVFOCUS_SOCKET`, else `evfocus/socket` in `$XDG_RUNTIME_DIR`, else `/run/evfocus/socket`. Daemon and command line agree on it.
+pub fn default_socket() -> PathBuf {
+    if let Some(socket) = std::env::var_os("EVFOCUS_SOCKET") {
+        return PathBuf::from(socket);
+    }
+    let base = std::env::var_os("XDG_RUNTIME_DIR").map_or_else(|| PathBuf::from("/run"), PathBuf::from);
+    base.join("evfocus").join("socket")
+}
+
+/// `$STATE_DIRECTORY` (set by systemd), else `evfocus` in `$XDG_STATE_HOME` or `~/.local/state`, else `/var/lib/evfocus`.
+pub fn default_state_dir() -> PathBuf {
+    let in_home = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".local/state"));
+    if let Some(systemd) = std::env::var_os("STATE_DIRECTORY") {
+        return PathBuf::from(systemd);
+    }
+    let base = std::env::var_os("XDG_STATE_HOME").map(PathBuf::from).or_else(in_home);
+    base.map_or_else(|| PathBuf::from("/var/lib/evfocus"), |base| base.join("evfocus"))
+}

@@ -1,0 +1,211 @@
+//! `[focus]`: how a run goes.
+
+use evfocus_core::controller::{ControllerConfig, OnFailure};
+use evfocus_core::{Directions, LensPosition, LensRange, LensSpeed, Method, SweepCapacity, SweepLimits};
+use evfocus_hal::LensInfo;
+use serde::Deserialize;
+
+use super::BadValue;
+
+/// `[focus]`. Absent keys take the lens's own figures or the defaults of
+/// [`ControllerConfig::for_lens`].
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FocusSection {
+    /// `egs` (default), `egs-official`, `er-fixed` or `er-squared`.
+    pub method: Option<String>,
+    /// Accumulation interval of `er-fixed`, milliseconds; 1 to 10,000, default 55.
+    pub interval_ms: Option<f64>,
+    /// `both` (default): there and back, the mean is the answer; `forward`: one sweep.
+    pub directions: Option<String>,
+    /// Speed of the sweep, counts per second; default: the lens's highest.
+    pub sweep_speed_counts_per_s: Option<f64>,
+    /// Rest before the sweep and before the verdict, milliseconds; 10 to 10,000, default 100.
+    pub rest_ms: Option<f64>,
+    /// How near to its target the lens must come to rest, counts; default 0.3 % of the range.
+    pub position_tolerance_counts: Option<f64>,
+    /// How far before the answer the last approach begins, counts; more than the backlash; default 2 % of the range.
+    pub approach_margin_counts: Option<f64>,
+    /// What the lens does when a run fails: `restore` (default) or `stay`.
+    pub on_failure: Option<String>,
+    /// A lens that stands still for this long while it should move is stuck, milliseconds; 50 to 60,000, default 500.
+    pub stall_timeout_ms: Option<f64>,
+    /// Silence after which camera or lens is given up, milliseconds; 50 to 60,000, default 1000.
+    pub silence_timeout_ms: Option<f64>,
+    /// What a motion may take beyond twice its distance by speed, seconds; 0 to 600, default 2.
+    pub motion_slack_s: Option<f64>,
+    /// How long homing may take, seconds; 1 to 600, default 30.
+    pub homing_timeout_s: Option<f64>,
+    /// Width of the counter's bins, microseconds; 1 to 1000, default 20.
+    pub bin_us: Option<f64>,
+    /// The longest sweep, seconds; 0.1 to 120, default 20. Memory: 16 bytes a bin.
+    pub longest_sweep_s: Option<f64>,
+    /// Events kept for the measures that need pixels; default 16,000,000, 8 bytes each.
+    pub events_kept: Option<u32>,
+    /// A sweep with fewer events is not searched; default 2000.
+    pub fewest_events: Option<u32>,
+    /// The largest share of events that may be lost, 0 to 1; default 0.05.
+    pub largest_lost_share: Option<f64>,
+    /// The largest half-difference of the two directions as a share of the range, 0 to 1; default 0.15.
+    pub largest_mismatch_share: Option<f64>,
+    /// An answer this near to an end of the range, as a share of it, means that focus lies beyond; 0 to 0.4, default 0.02.
+    pub edge_share: Option<f64>,
+}
+
+impl FocusSection {
+    pub(super) fn controller(
+        &self,
+        lens: &LensInfo,
+        min: Option<LensPosition>,
+        max: Option<LensPosition>,
+    ) -> Result<ControllerConfig, BadValue> {
+        let (low, high) = (min.unwrap_or(lens.range.min()), max.unwrap_or(lens.range.max()));
+        for (key, limit) in [("lens.min_counts", low), ("lens.max_counts", high)] {
+            if !lens.range.contains(limit) {
+                return Err(BadValue::new(key, limit.0, format!("the lens goes from {}", lens.range)));
+            }
+        }
+        let limits = LensRange::new(low, high)
+            .map_err(|error| BadValue::new("lens.min_counts", low.0, error.to_string()))?;
+        let mut config = ControllerConfig::for_lens(limits, lens.max_speed);
+        config.needs_homing = lens.needs_homing;
+        self.choices(&mut config)?;
+        self.motion(&mut config, lens)?;
+        self.sweep(&mut config)?;
+        Ok(config)
+    }
+
+    fn choices(&self, config: &mut ControllerConfig) -> Result<(), BadValue> {
+        if let Some(name) = &self.method {
+            config.method = name
+                .parse::<Method>()
+                .map_err(|error| BadValue::new("focus.method", name, error.to_string()))?;
+        }
+        if let Some(name) = &self.directions {
+            config.directions = match name.as_str() {
+                "both" => Directions::Both,
+                "forward" => Directions::Forward,
+                _ => {
+                    return Err(BadValue::new(
+                        "focus.directions",
+                        name,
+                        "it must be \"both\" or \"forward\"",
+                    ));
+                }
+            };
+        }
+        if let Some(name) = &self.on_failure {
+            config.on_failure = match name.as_str() {
+                "restore" => OnFailure::Restore,
+                "stay" => OnFailure::Stay,
+                _ => {
+                    return Err(BadValue::new(
+                        "focus.on_failure",
+                        name,
+                        "it must be \"restore\" or \"stay\"",
+                    ));
+                }
+            };
+        }
+        Ok(())
+    }
+
+    fn motion(&self, config: &mut ControllerConfig, lens: &LensInfo) -> Result<(), BadValue> {
+        let length = config.limits.length();
+        if let Some(speed) = self.sweep_speed_counts_per_s {
+            let key = "focus.sweep_speed_counts_per_s";
+            BadValue::check(key, speed, f64::MIN_POSITIVE, lens.max_speed.counts_per_second())?;
+            config.sweep_speed =
+                LensSpeed::new(speed).map_err(|error| BadValue::new(key, speed, error.to_string()))?;
+        }
+        set(
+            &mut config.position_tolerance,
+            "focus.position_tolerance_counts",
+            self.position_tolerance_counts,
+            0.0,
+            length,
+        )?;
+        set(
+            &mut config.approach_margin,
+            "focus.approach_margin_counts",
+            self.approach_margin_counts,
+            0.0,
+            length,
+        )?;
+        let milliseconds = 1e-3;
+        set_duration(&mut config.rest, "focus.rest_ms", self.rest_ms, milliseconds, (10.0, 1e4))?;
+        set_duration(
+            &mut config.stall_timeout,
+            "focus.stall_timeout_ms",
+            self.stall_timeout_ms,
+            milliseconds,
+            (50.0, 6e4),
+        )?;
+        set_duration(
+            &mut config.silence_timeout,
+            "focus.silence_timeout_ms",
+            self.silence_timeout_ms,
+            milliseconds,
+            (50.0, 6e4),
+        )?;
+        set_duration(
+            &mut config.motion_slack,
+            "focus.motion_slack_s",
+            self.motion_slack_s,
+            1.0,
+            (0.0, 600.0),
+        )?;
+        set_duration(
+            &mut config.homing_timeout,
+            "focus.homing_timeout_s",
+            self.homing_timeout_s,
+            1.0,
+            (1.0, 600.0),
+        )
+    }
+
+    fn sweep(&self, config: &mut ControllerConfig) -> Result<(), BadValue> {
+        set_duration(&mut config.interval, "focus.interval_ms", self.interval_ms, 1e-3, (1.0, 1e4))?;
+        let SweepCapacity { bin, longest, events } = &mut config.capacity;
+        set_duration(bin, "focus.bin_us", self.bin_us, 1e-6, (1.0, 1000.0))?;
+        set_duration(longest, "focus.longest_sweep_s", self.longest_sweep_s, 1.0, (0.1, 120.0))?;
+        if let Some(kept) = self.events_kept {
+            BadValue::check("focus.events_kept", f64::from(kept), 0.0, 1e9)?;
+            *events = kept as usize;
+        }
+        let SweepLimits { fewest_events, largest_lost_share, largest_flicker_depth: _ } =
+            &mut config.sweep_limits;
+        if let Some(fewest) = self.fewest_events {
+            *fewest_events = u64::from(fewest);
+        }
+        set(largest_lost_share, "focus.largest_lost_share", self.largest_lost_share, 0.0, 1.0)?;
+        set(
+            &mut config.largest_mismatch_share,
+            "focus.largest_mismatch_share",
+            self.largest_mismatch_share,
+            0.0,
+            1.0,
+        )?;
+        set(&mut config.edge_share, "focus.edge_share", self.edge_share, 0.0, 0.4)
+    }
+}
+
+fn set(place: &mut f64, key: &str, value: Option<f64>, min: f64, max: f64) -> Result<(), BadValue> {
+    if let Some(value) = value {
+        *place = BadValue::check(key, value, min, max)?;
+    }
+    Ok(())
+}
+
+fn set_duration(
+    place: &mut std::time::Duration,
+    key: &str,
+    value: Option<f64>,
+    unit_s: f64,
+    (min, max): (f64, f64),
+) -> Result<(), BadValue> {
+    if let Some(value) = value {
+        *place = BadValue::duration(key, value, unit_s, min, max)?;
+    }
+    Ok(())
+}

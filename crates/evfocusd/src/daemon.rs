@@ -1,0 +1,252 @@
+//! Starts everything in order, and stops it in order.
+
+use std::future::Future;
+use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use evfocus_core::controller::{Command as CoreCommand, Mode};
+use evfocus_core::{Controller, EventBatch, RunId};
+use evfocus_hal::{CameraInfo, Clock, LensInfo, SystemClock};
+use evfocus_ipc::server::Limits;
+use evfocus_ipc::{self as ipc, Device, DeviceRole, DeviceState, Error, Report, Status};
+use rtrb::RingBuffer;
+use tokio::sync::{broadcast, mpsc, watch};
+
+use crate::config::Config;
+use crate::devices::{self, Devices};
+use crate::handle::{Handle, Lookups};
+use crate::publisher::{Constants, PROGRESS, Publisher, Reports};
+use crate::reports::ReportStore;
+use crate::service;
+use crate::threads::camera::{BATCH_EVENTS, BATCHES, CameraThread};
+use crate::threads::control::{CURVE_POINTS, ControlThread, Publications, REPORTS};
+use crate::threads::lens::{LensThread, ORDERS, SAMPLES};
+use crate::threads::{NOTICES, StopFlag};
+
+/// Commands from clients that may wait for the control thread, which looks every 2 ms.
+const COMMANDS: usize = 64;
+/// How long the threads have to end; systemd gives 90 s.
+const STOP_TIME: Duration = Duration::from_secs(5);
+
+/// Runs the daemon of `config` until `shutdown` completes; `ready` is called once clients are served.
+///
+/// Needs a current-thread tokio runtime with time and input/output.
+///
+/// # Errors
+/// What keeps the daemon from starting, with the remedy; or that one of its threads has died.
+pub async fn run(
+    config: Config,
+    ready: impl FnOnce(),
+    shutdown: impl Future<Output = ()>,
+) -> anyhow::Result<()> {
+    let socket = ipc::server::Socket::bind(&config.socket)
+        .with_context(|| format!("cannot listen on {}", config.socket.display()))?;
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
+    let devices = Devices::open(&config, &clock)?;
+    let mut running = Running::start(&config, devices, &clock)?;
+    tracing::info!(socket = %config.socket.display(), state_dir = %config.state_dir.display(), "ready");
+    ready();
+    let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());
+    let handle = running.handle.clone();
+    let threads_alive = running.ended.recv();
+    let mut died = false;
+    let until = async {
+        tokio::select! {
+            () = shutdown => {}
+            _ = threads_alive => died = true,
+        }
+    };
+    service::serve(socket, handle, Limits::default(), until).await;
+    let stopped = running.stop().await;
+    // The control thread is gone, so the publisher ends once it has written the last report.
+    tokio::time::timeout(STOP_TIME, publisher).await.context("the last report was not written in time")??;
+    stopped?;
+    if died {
+        bail!("a thread of the daemon has ended by itself; the lens is stopped; the log says more");
+    }
+    tracing::info!("stopped");
+    Ok(())
+}
+
+/// The daemon's threads and the ends of their queues.
+struct Running {
+    handle: Handle,
+    publisher: Option<Publisher>,
+    stop: StopFlag,
+    threads: Vec<(&'static str, JoinHandle<()>)>,
+    /// A thread that ends says so here.
+    ended: mpsc::Receiver<()>,
+}
+
+impl Running {
+    fn start(config: &Config, devices: Devices, clock: &Arc<dyn Clock>) -> anyhow::Result<Self> {
+        let (camera_info, lens_info) = (devices.camera.info(), devices.lens.info());
+        let settings = config
+            .controller(&lens_info)
+            .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
+        let limits = settings.limits;
+        let store = Reports::new(ReportStore::open(&config.state_dir, config.reports_kept));
+        if let Some(fault) = store.fault() {
+            tracing::error!(%fault, "reports are kept in memory only");
+        }
+        let mut controller = Controller::new(settings, camera_info.geometry, clock.now());
+        controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
+        if config.mode == Mode::Manual {
+            // An idle controller refuses no change of mode and has nothing to do for it.
+            controller.command(CoreCommand::SetMode(Mode::Manual), clock.now(), &mut Vec::new())?;
+        }
+
+        let (filled_in, filled_out) = RingBuffer::new(BATCHES);
+        let (mut empty_in, empty_out) = RingBuffer::new(BATCHES);
+        while empty_in.push(EventBatch::with_capacity(BATCH_EVENTS)).is_ok() {}
+        let (samples_in, samples_out) = RingBuffer::new(SAMPLES);
+        let (camera_notices_in, camera_notices_out) = RingBuffer::new(NOTICES);
+        let (lens_notices_in, lens_notices_out) = RingBuffer::new(NOTICES);
+        let (curve_in, curve_out) = RingBuffer::new(CURVE_POINTS);
+        let (orders_in, orders_out) = sync_channel(ORDERS);
+        let (commands_in, commands_out) = mpsc::channel(COMMANDS);
+        let (reports_in, reports_out) = mpsc::channel(REPORTS);
+        let (snapshots_in, snapshots_out) = watch::channel(controller.snapshot());
+        let (status_in, status_out) = watch::channel(Arc::new(Status::default()));
+        let (progress_in, _) = broadcast::channel(PROGRESS);
+
+        let stop = StopFlag::default();
+        let (ended_in, ended) = mpsc::channel(3);
+        let control = ControlThread {
+            controller,
+            clock: Arc::clone(clock),
+            filled: filled_out,
+            empty: empty_in,
+            samples: samples_out,
+            notices: [camera_notices_out, lens_notices_out],
+            commands: commands_out,
+            orders: orders_in,
+            publications: Publications { snapshots: snapshots_in, curve: curve_in, reports: reports_in },
+            stop: stop.clone(),
+        };
+        let control = spawn("evfocus-control", &ended_in, move || control.run())?;
+        let camera = CameraThread {
+            camera: devices.camera,
+            clock: Arc::clone(clock),
+            empty: empty_out,
+            filled: filled_in,
+            notices: camera_notices_in,
+            control: control.thread().clone(),
+            stop: stop.clone(),
+        };
+        let lens = LensThread {
+            lens: devices.lens,
+            clock: Arc::clone(clock),
+            poll: config.lens_poll,
+            orders: orders_out,
+            samples: samples_in,
+            notices: lens_notices_in,
+            control: control.thread().clone(),
+        };
+        let camera = spawn("evfocus-camera", &ended_in, move || camera.run())?;
+        let lens = spawn("evfocus-lens", &ended_in, move || lens.run())?;
+
+        let run_devices = ipc::RunDevices {
+            camera: devices::name(&camera_info.model, &camera_info.serial),
+            lens: devices::name(&lens_info.model, &lens_info.serial),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        };
+        let lookups = DaemonLookups { camera: camera_info, lens: lens_info, reports: store.clone() };
+        let followers = progress_in.downgrade();
+        let publisher = Publisher {
+            snapshots: snapshots_out,
+            curve: curve_out,
+            reports: reports_out,
+            status: status_in,
+            progress: progress_in,
+            store,
+            constants: Constants { devices: run_devices, limits },
+            clock: Arc::clone(clock),
+        };
+        Ok(Self {
+            handle: Handle {
+                commands: commands_in,
+                status: status_out,
+                progress: followers,
+                lookups: Arc::new(lookups),
+            },
+            publisher: Some(publisher),
+            stop,
+            threads: vec![("control", control), ("camera", camera), ("lens", lens)],
+            ended,
+        })
+    }
+
+    /// Stops the control thread, which stops the lens, and waits for all.
+    async fn stop(mut self) -> anyhow::Result<()> {
+        self.stop.stop();
+        let threads = std::mem::take(&mut self.threads);
+        let join = tokio::task::spawn_blocking(move || {
+            threads
+                .into_iter()
+                .filter_map(|(name, thread)| thread.join().is_err().then_some(name))
+                .collect::<Vec<_>>()
+        });
+        let panicked =
+            tokio::time::timeout(STOP_TIME, join).await.context("the threads did not stop in time")??;
+        if !panicked.is_empty() {
+            bail!("the {} thread has panicked; the log says where", panicked.join(" and the "));
+        }
+        Ok(())
+    }
+}
+
+/// Starts a named thread that reports its end, by return or by panic.
+fn spawn(
+    name: &str,
+    ended: &mpsc::Sender<()>,
+    body: impl FnOnce() + Send + 'static,
+) -> anyhow::Result<JoinHandle<()>> {
+    struct Ended(mpsc::Sender<()>);
+    impl Drop for Ended {
+        fn drop(&mut self) {
+            // There is room for every thread's word.
+            self.0.try_send(()).unwrap_or_default();
+        }
+    }
+    let ended = Ended(ended.clone());
+    std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(move || {
+            let _ended = ended;
+            body();
+        })
+        .with_context(|| format!("cannot start the thread {name}"))
+}
+
+/// What clients may look up without the control thread.
+struct DaemonLookups {
+    camera: CameraInfo,
+    lens: LensInfo,
+    reports: Reports,
+}
+
+impl Lookups for DaemonLookups {
+    fn devices(&self) -> Result<Vec<Device>, Error> {
+        let device = |role, model: &str, serial: &str| Device {
+            role,
+            driver: "simulated".to_owned(),
+            model: model.to_owned(),
+            serial: serial.to_owned(),
+            location: "simulated".to_owned(),
+            state: DeviceState::Active,
+            message: None,
+        };
+        Ok(vec![
+            device(DeviceRole::Camera, &self.camera.model, &self.camera.serial),
+            device(DeviceRole::Lens, &self.lens.model, &self.lens.serial),
+        ])
+    }
+
+    fn report(&self, id: Option<u64>) -> Result<Report, Error> {
+        self.reports.read(id)
+    }
+}

@@ -1,0 +1,23 @@
+//! Where the log goes: to journald when systemd started the daemon, else to the terminal.
+
+use std::io::IsTerminal;
+
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+
+/// Starts to log. `EVFOCUS_LOG` sets levels (`debug`, `evfocusd=trace`); default `info`.
+pub fn start() {
+    let filter = EnvFilter::try_from_env("EVFOCUS_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let registry = tracing_subscriber::registry().with(filter);
+    // systemd sets JOURNAL_STREAM where standard error is the journal: then fields go there as fields.
+    let journal = std::env::var_os("JOURNAL_STREAM").and_then(|_| tracing_journald::layer().ok());
+    if let Some(journal) = journal {
+        registry.with(journal).init();
+    } else {
+        let terminal = std::io::stderr().is_terminal();
+        registry
+            .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_ansi(terminal))
+            .init();
+    }
+}

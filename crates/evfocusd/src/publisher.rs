@@ -1,0 +1,242 @@
+//! From what the control thread publishes to what clients see: status, progress, reports.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use evfocus_core::controller::Snapshot;
+use evfocus_core::{CurvePoint, LensRange, RunId, RunReport};
+use evfocus_hal::{Clock, unix_time};
+use evfocus_ipc::{self as ipc, Progress, Report, Status};
+use rtrb::Consumer;
+use tokio::sync::{broadcast, mpsc, watch};
+
+use crate::reports::ReportStore;
+use crate::wire;
+
+/// Messages of a run that a follower may be behind: a sweep of 20 s at 50 points a second.
+pub const PROGRESS: usize = 1_024;
+
+/// What stays the same while the daemon runs.
+#[derive(Debug, Clone)]
+pub struct Constants {
+    /// The devices.
+    pub devices: ipc::RunDevices,
+    /// Where the lens may go.
+    pub limits: LensRange,
+}
+
+/// The task on the socket's side.
+pub struct Publisher {
+    /// From the control thread.
+    pub snapshots: watch::Receiver<Snapshot>,
+    /// From the control thread.
+    pub curve: Consumer<(RunId, CurvePoint)>,
+    /// From the control thread.
+    pub reports: mpsc::Receiver<Box<RunReport>>,
+    /// To the clients.
+    pub status: watch::Sender<Arc<Status>>,
+    /// To the clients.
+    pub progress: broadcast::Sender<Arc<Progress>>,
+    /// To the disk.
+    pub store: Reports,
+    /// What stays the same.
+    pub constants: Constants,
+    /// Host time.
+    pub clock: Arc<dyn Clock>,
+}
+
+impl std::fmt::Debug for Publisher {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Publisher").field("constants", &self.constants).finish_non_exhaustive()
+    }
+}
+
+/// The reports on disk, and the newest one in memory: a full disk must not swallow it.
+#[derive(Debug, Clone)]
+pub struct Reports {
+    store: Result<ReportStore, ipc::Error>,
+    newest: watch::Sender<Option<Arc<Report>>>,
+}
+
+impl Reports {
+    /// Reports in `store`, or in memory only if that could not be opened.
+    pub fn new(store: Result<ReportStore, ipc::Error>) -> Self {
+        Self { store, newest: watch::Sender::new(None) }
+    }
+
+    /// What is wrong with the store.
+    pub fn fault(&self) -> Option<String> {
+        self.store.as_ref().err().map(ToString::to_string)
+    }
+
+    /// The number of the newest report on disk.
+    pub fn newest_on_disk(&self) -> Option<u64> {
+        self.store.as_ref().ok()?.newest()
+    }
+
+    fn write(&self, report: &Arc<Report>) -> Result<(), ipc::Error> {
+        self.newest.send_replace(Some(Arc::clone(report)));
+        match &self.store {
+            Ok(store) => {
+                store.write(report).map(|path| tracing::debug!(path = %path.display(), "report written"))
+            }
+            Err(error) => Err(error.clone()),
+        }
+    }
+
+    /// The report of run `id`, or of the last one.
+    ///
+    /// # Errors
+    /// [`ipc::Error::NoSuchReport`] or [`ipc::Error::StorageFailed`].
+    pub fn read(&self, id: Option<u64>) -> Result<Report, ipc::Error> {
+        if let Some(newest) = self.newest.borrow().as_ref()
+            && id.is_none_or(|id| id == newest.run_id)
+        {
+            return Ok(Report::clone(newest));
+        }
+        match &self.store {
+            Ok(store) => store.read(id),
+            Err(_) => Err(ipc::Error::NoSuchReport { id }),
+        }
+    }
+}
+
+impl Publisher {
+    /// Runs until the control thread is gone.
+    pub async fn run(mut self) {
+        let mut fault = self.store.fault();
+        let mut last_run = self.store.read(None).ok().map(|report| last_run(&report));
+        let mut run_started = 0.0;
+        let mut run_under_way = None;
+        loop {
+            tokio::select! {
+                changed = self.snapshots.changed() => {
+                    if changed.is_err() {
+                        break;
+                    }
+                    let snapshot = *self.snapshots.borrow_and_update();
+                    if snapshot.run != run_under_way {
+                        run_under_way = snapshot.run;
+                        run_started = unix_time().as_secs_f64();
+                    }
+                    let curve_points = self.send_curve(&snapshot);
+                    if let Some(run) = snapshot.run && !curve_points {
+                        self.send(progress(run, &snapshot, None));
+                    }
+                    let status = self.status(&snapshot, last_run.clone(), fault.clone());
+                    self.status.send_replace(Arc::new(status));
+                }
+                Some(run) = self.reports.recv() => {
+                    let snapshot = *self.snapshots.borrow();
+                    self.send_curve(&snapshot);
+                    let circumstances = wire::Circumstances { started_unix_s: run_started, devices: self.constants.devices.clone() };
+                    let report = Arc::new(wire::report(&run, circumstances));
+                    log(&report);
+                    fault = keep(self.store.clone(), Arc::clone(&report)).await;
+                    last_run = Some(self::last_run(&report));
+                    let status = self.status(&snapshot, last_run.clone(), fault.clone());
+                    self.status.send_replace(Arc::new(status));
+                    self.send(Progress { done: true, report: Some(Report::clone(&report)), ..progress(run.id, &snapshot, None) });
+                }
+            }
+        }
+    }
+
+    /// Sends the points of the live curve that have come; whether there were any.
+    fn send_curve(&mut self, snapshot: &Snapshot) -> bool {
+        let mut any = false;
+        while let Ok((run, point)) = self.curve.pop() {
+            self.send(progress(run, snapshot, Some(point)));
+            any = true;
+        }
+        any
+    }
+
+    fn send(&self, progress: Progress) {
+        // Nobody may be listening.
+        let listeners = self.progress.send(Arc::new(progress)).unwrap_or(0);
+        tracing::trace!(listeners, "progress");
+    }
+
+    fn status(&self, snapshot: &Snapshot, last_run: Option<ipc::LastRun>, fault: Option<String>) -> Status {
+        let device = |ready: bool, name: &str| ready.then(|| name.to_owned());
+        let missing = match (snapshot.camera_ready, snapshot.lens_ready) {
+            (true, true) => None,
+            (false, true) => {
+                Some("the camera does not answer: check its cable; the log has its words".to_owned())
+            }
+            (true, false) => {
+                Some("the lens does not answer: check its cable; the log has its words".to_owned())
+            }
+            (false, false) => Some("neither camera nor lens answers: check their cables".to_owned()),
+        };
+        Status {
+            mode: wire::mode(snapshot.mode),
+            state: wire::state(snapshot.state),
+            phase: wire::phase(snapshot.phase),
+            run_id: snapshot.run.map(|run| run.0),
+            lens_position: snapshot.lens.map(|lens| lens.position.0),
+            lens_moving: snapshot.lens.is_some_and(|lens| lens.moving),
+            lens_range: Some(wire::lens_range(self.constants.limits)),
+            event_rate: snapshot.event_rate.0,
+            events_lost: snapshot.lost,
+            last_run,
+            camera: device(snapshot.camera_ready, &self.constants.devices.camera),
+            lens: device(snapshot.lens_ready, &self.constants.devices.lens),
+            fault: missing.or(fault),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            uptime_s: Duration::from_micros(u64::try_from(self.clock.now().0).unwrap_or(0)).as_secs_f64(),
+        }
+    }
+}
+
+/// Writes the report away from this thread, which serves clients meanwhile. Returns what went wrong.
+async fn keep(store: Reports, report: Arc<Report>) -> Option<String> {
+    let written = tokio::task::spawn_blocking(move || store.write(&report)).await;
+    let error = match written {
+        Ok(Ok(())) => return None,
+        Ok(Err(error)) => error.to_string(),
+        Err(panic) => panic.to_string(),
+    };
+    tracing::error!(%error, "the report is kept in memory only");
+    Some(format!("the last report is kept in memory only: {error}"))
+}
+
+fn progress(run: RunId, snapshot: &Snapshot, point: Option<CurvePoint>) -> Progress {
+    Progress {
+        run_id: run.0,
+        phase: wire::phase(snapshot.phase),
+        lens_position: snapshot.lens.map(|lens| lens.position.0),
+        event_rate: snapshot.event_rate.0,
+        curve_point: point.map(|point| ipc::CurvePoint {
+            position: point.position.0,
+            rate: point.rate.0,
+            t_us: point.t_us.round() as i64,
+        }),
+        missed: 0,
+        done: false,
+        report: None,
+    }
+}
+
+fn last_run(report: &Report) -> ipc::LastRun {
+    ipc::LastRun {
+        id: report.run_id,
+        state: report.result.state,
+        position: report.result.position,
+        reason: report.result.reason.clone(),
+    }
+}
+
+/// One line for each run.
+fn log(report: &Report) {
+    let (run, elapsed_s) = (report.run_id, report.elapsed_s);
+    let (events, lost) = (report.events.counted, report.events.lost);
+    match (&report.result.reason, report.result.position) {
+        (None, Some(position)) => tracing::info!(run, position, events, lost, elapsed_s, "focused"),
+        (reason, _) => {
+            let reason = reason.as_deref().unwrap_or("unknown");
+            tracing::info!(run, reason, message = %report.result.message, events, lost, elapsed_s, "not focused");
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! The state directory: a JSON file for each run, written so that a reader sees all of it or nothing.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use evfocus_ipc::{Error, Report};
+
+const PREFIX: &str = "run-";
+const SUFFIX: &str = ".json";
+
+/// Where reports are kept.
+#[derive(Debug, Clone)]
+pub struct ReportStore {
+    directory: PathBuf,
+    kept: usize,
+}
+
+impl ReportStore {
+    /// The store in `state_dir`, which is made if it is not there. Of the reports, the newest `kept` stay.
+    ///
+    /// # Errors
+    /// [`Error::StorageFailed`], naming the directory and the remedy.
+    pub fn open(state_dir: &Path, kept: usize) -> Result<Self, Error> {
+        let store = Self { directory: state_dir.join("reports"), kept: kept.max(1) };
+        fs::create_dir_all(&store.directory).map_err(|error| failed(&store.directory, &error))?;
+        Ok(store)
+    }
+
+    fn path(&self, id: u64) -> PathBuf {
+        // Leading zeros make an alphabetical listing chronological.
+        self.directory.join(format!("{PREFIX}{id:08}{SUFFIX}"))
+    }
+
+    /// Writes `report`: to a file of another name, which is made durable and then renamed.
+    ///
+    /// # Errors
+    /// [`Error::StorageFailed`], naming the file; what was there before stays.
+    pub fn write(&self, report: &Report) -> Result<PathBuf, Error> {
+        let path = self.path(report.run_id);
+        let temporary = path.with_extension("json.new");
+        let written = self.write_through(report, &temporary, &path);
+        if let Err(error) = written {
+            // What is left of the attempt takes room that is short; if even this fails there is nothing to add.
+            fs::remove_file(&temporary).unwrap_or_default();
+            return Err(failed(&path, &error));
+        }
+        self.drop_oldest();
+        Ok(path)
+    }
+
+    fn write_through(&self, report: &Report, temporary: &Path, path: &Path) -> io::Result<()> {
+        let mut file = File::create(temporary)?;
+        let mut json = serde_json::to_vec_pretty(report)?;
+        json.push(b'\n');
+        file.write_all(&json)?;
+        file.sync_all()?;
+        fs::rename(temporary, path)?;
+        // The new name must survive a power cut too.
+        File::open(&self.directory)?.sync_all()
+    }
+
+    /// The report of run `id`, or of the newest run that has one.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchReport`], or [`Error::StorageFailed`] if it is there and cannot be read.
+    pub fn read(&self, id: Option<u64>) -> Result<Report, Error> {
+        let Some(wanted) = id.or_else(|| self.newest()) else {
+            return Err(Error::NoSuchReport { id });
+        };
+        let path = self.path(wanted);
+        let text = match fs::read(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(Error::NoSuchReport { id }),
+            Err(error) => return Err(failed(&path, &error)),
+        };
+        serde_json::from_slice(&text).map_err(|error| Error::StorageFailed {
+            path: path.display().to_string(),
+            message: format!("not a report of this version: {error}"),
+        })
+    }
+
+    /// The number of the newest report.
+    pub fn newest(&self) -> Option<u64> {
+        self.numbers().into_iter().max()
+    }
+
+    fn numbers(&self) -> Vec<u64> {
+        let Ok(entries) = fs::read_dir(&self.directory) else { return Vec::new() };
+        entries
+            .filter_map(|entry| {
+                let name = entry.ok()?.file_name();
+                name.to_str()?.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?.parse().ok()
+            })
+            .collect()
+    }
+
+    fn drop_oldest(&self) {
+        let mut numbers = self.numbers();
+        numbers.sort_unstable();
+        let surplus = numbers.len().saturating_sub(self.kept);
+        for &number in numbers.iter().take(surplus) {
+            if let Err(error) = fs::remove_file(self.path(number)) {
+                tracing::warn!(run = number, %error, "an old report cannot be deleted");
+            }
+        }
+    }
+}
+
+fn failed(path: &Path, error: &io::Error) -> Error {
+    let remedy = match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on that disk",
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "let the daemon's user write there, or name another directory with --state-dir"
+        }
+        _ => "check the directory, or name another one with --state-dir",
+    };
+    Error::StorageFailed { path: path.display().to_string(), message: format!("{error}; {remedy}") }
+}

@@ -1,0 +1,226 @@
+//! `evfocus-control`: feeds the controller and does what it decides.
+
+use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, TrySendError};
+use std::time::Duration;
+
+use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, DeviceFailure, Input, Snapshot};
+use evfocus_core::{Controller, CurvePoint, EventBatch, HostMicros, LensSample, RunId, RunReport};
+use evfocus_hal::Clock;
+use rtrb::{Consumer, Producer};
+use tokio::sync::{mpsc, watch};
+
+use super::{Notice, StopFlag};
+use crate::handle::Command;
+use crate::wire;
+
+/// How long the thread sleeps unless somebody wakes it: commands wake nobody.
+const NAP: Duration = Duration::from_millis(2);
+/// How often the state is published while nothing changes but numbers.
+const PUBLISH: Duration = Duration::from_millis(20);
+/// Actions one input can bring about, with room to spare.
+const ACTIONS: usize = 16;
+/// Curve points on their way to the followers.
+pub const CURVE_POINTS: usize = 4_096;
+/// Reports on their way to the disk.
+pub const REPORTS: usize = 16;
+
+/// What leaves the control thread for the socket's side.
+#[derive(Debug)]
+pub struct Publications {
+    /// The state, a few dozen times a second.
+    pub snapshots: watch::Sender<Snapshot>,
+    /// The live curve.
+    pub curve: Producer<(RunId, CurvePoint)>,
+    /// The record of each run.
+    pub reports: mpsc::Sender<Box<RunReport>>,
+}
+
+/// The thread's ends of its queues.
+pub struct ControlThread {
+    /// The state machine.
+    pub controller: Controller,
+    /// Host time.
+    pub clock: Arc<dyn Clock>,
+    /// Filled batches come here.
+    pub filled: Consumer<EventBatch>,
+    /// Empty batches go back.
+    pub empty: Producer<EventBatch>,
+    /// The lens's answers come here.
+    pub samples: Consumer<LensSample>,
+    /// Health of camera and lens.
+    pub notices: [Consumer<Notice>; 2],
+    /// Commands from the socket.
+    pub commands: mpsc::Receiver<Command>,
+    /// Orders to the lens.
+    pub orders: SyncSender<Action>,
+    /// To the socket's side.
+    pub publications: Publications,
+    /// When to end.
+    pub stop: StopFlag,
+}
+
+impl std::fmt::Debug for ControlThread {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ControlThread").field("controller", &self.controller).finish_non_exhaustive()
+    }
+}
+
+impl ControlThread {
+    /// Runs until stopped; a run under way is aborted then. Dropping the orders' queue stops the lens.
+    pub fn run(mut self) {
+        let mut actions = Vec::with_capacity(ACTIONS);
+        let mut published = (HostMicros(i64::MIN), self.controller.snapshot());
+        let mut curve_sent = (RunId(0), 0);
+        while !self.stop.is_stopped() {
+            std::thread::park_timeout(NAP);
+            self.take_notices(&mut actions);
+            self.take_samples(&mut actions);
+            self.take_batches(&mut actions);
+            self.controller.handle(Input::Tick, self.clock.now(), &mut actions);
+            self.perform(&mut actions);
+            self.take_commands(&mut actions);
+            self.publish_curve(&mut curve_sent);
+            self.publish(&mut published);
+        }
+        if self.controller.command(CoreCommand::Abort, self.clock.now(), &mut actions).is_ok() {
+            self.perform(&mut actions);
+        }
+    }
+
+    fn take_notices(&mut self, actions: &mut Vec<Action>) {
+        for queue in &mut self.notices {
+            while let Ok(notice) = queue.pop() {
+                let input = match notice {
+                    Notice::CameraFailed(failure) => Input::CameraFailed(failure),
+                    Notice::CameraReady => Input::CameraReady,
+                    Notice::LensFailed(failure) => Input::LensFailed(failure),
+                    Notice::LensReady => Input::LensReady,
+                };
+                self.controller.handle(input, self.clock.now(), actions);
+            }
+        }
+    }
+
+    fn take_samples(&mut self, actions: &mut Vec<Action>) {
+        while let Ok(sample) = self.samples.pop() {
+            self.controller.handle(Input::Lens(sample), self.clock.now(), actions);
+        }
+    }
+
+    fn take_batches(&mut self, actions: &mut Vec<Action>) {
+        while let Ok(mut batch) = self.filled.pop() {
+            self.controller.handle(Input::Batch(&batch), self.clock.now(), actions);
+            batch.clear();
+            // There is a place for every batch, so the way back is never full.
+            if self.empty.push(batch).is_err() {
+                tracing::error!("a batch did not find its way back");
+            }
+        }
+    }
+
+    fn take_commands(&mut self, actions: &mut Vec<Action>) {
+        while let Ok(command) = self.commands.try_recv() {
+            let now = self.clock.now();
+            match command {
+                Command::Focus { request, answer } => {
+                    let done = wire::focus_request(&request).and_then(|request| {
+                        match self.controller.command(CoreCommand::Focus(request), now, actions) {
+                            Ok(Accepted::Started(run) | Accepted::UnderWay(run)) => Ok(run.0),
+                            Ok(Accepted::Done) => Ok(0),
+                            Err(refusal) => Err(wire::refusal(&refusal)),
+                        }
+                    });
+                    reply(answer, done);
+                }
+                Command::Abort { answer } => {
+                    let run = self.controller.snapshot().run;
+                    let done = self.controller.command(CoreCommand::Abort, now, actions);
+                    reply(
+                        answer,
+                        done.map(|_| run.map(|run| run.0)).map_err(|refusal| wire::refusal(&refusal)),
+                    );
+                }
+                Command::MoveTo { position, answer } => {
+                    let target = evfocus_core::LensPosition(position);
+                    let done = self.controller.command(CoreCommand::MoveTo(target), now, actions);
+                    reply(answer, done.map(|_| ()).map_err(|refusal| wire::refusal(&refusal)));
+                }
+                Command::SetMode { mode, answer } => {
+                    let done =
+                        self.controller.command(CoreCommand::SetMode(wire::core_mode(mode)), now, actions);
+                    reply(answer, done.map(|_| ()).map_err(|refusal| wire::refusal(&refusal)));
+                }
+            }
+            self.perform(actions);
+        }
+    }
+
+    fn perform(&mut self, actions: &mut Vec<Action>) {
+        let mut done = 0;
+        while let Some(&action) = actions.get(done) {
+            done += 1;
+            if action == Action::RunEnded {
+                self.hand_over_report();
+            } else {
+                self.order(action, actions);
+            }
+        }
+        actions.clear();
+    }
+
+    fn order(&mut self, action: Action, actions: &mut Vec<Action>) {
+        match self.orders.try_send(action) {
+            Ok(()) => {}
+            Err(TrySendError::Full(_)) => {
+                tracing::error!(?action, "the lens does not take orders");
+                self.controller.handle(Input::LensFailed(DeviceFailure::Silent), self.clock.now(), actions);
+            }
+            Err(TrySendError::Disconnected(_)) => {
+                tracing::error!(?action, "the lens thread has ended");
+                self.controller.handle(Input::LensFailed(DeviceFailure::Gone), self.clock.now(), actions);
+            }
+        }
+    }
+
+    fn hand_over_report(&mut self) {
+        if let Some(report) = self.controller.report()
+            && self.publications.reports.try_send(Box::new(report.clone())).is_err()
+        {
+            tracing::error!(run = report.id.0, "the report was not taken and is lost");
+        }
+    }
+
+    /// Sends the points of the live curve that have come since the last time.
+    fn publish_curve(&mut self, sent: &mut (RunId, usize)) {
+        let Some(run) = self.controller.snapshot().run else { return };
+        let curve = self.controller.live_curve();
+        if sent.0 != run || sent.1 > curve.len() {
+            *sent = (run, 0);
+        }
+        for point in curve.get(sent.1..).unwrap_or_default() {
+            // Followers that are this far behind are told so by their own queue; the report has every point.
+            if self.publications.curve.push((run, *point)).is_err() {
+                break;
+            }
+            sent.1 += 1;
+        }
+    }
+
+    fn publish(&mut self, published: &mut (HostMicros, Snapshot)) {
+        let (now, snapshot) = (self.clock.now(), self.controller.snapshot());
+        let changed = (snapshot.mode, snapshot.state, snapshot.phase, snapshot.run)
+            != (published.1.mode, published.1.state, published.1.phase, published.1.run);
+        if changed || now.since(published.0) >= PUBLISH {
+            *published = (now, snapshot);
+            self.publications.snapshots.send_replace(snapshot);
+        }
+    }
+}
+
+/// Answers a client, who may have gone.
+fn reply<Value>(answer: crate::handle::Answer<Value>, value: Result<Value, evfocus_ipc::Error>) {
+    if answer.send(value).is_err() {
+        tracing::debug!("a client went before its answer");
+    }
+}

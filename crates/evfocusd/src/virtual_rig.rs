@@ -1,0 +1,208 @@
+//! The simulated rig and the controller on one thread, in virtual time: the same loop as the daemon's, as fast as it can, and the
+//! same every time.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, Input, Refusal, Snapshot};
+use evfocus_core::{Controller, CurvePoint, EventBatch, HostMicros, LensPosition, RunReport};
+use evfocus_hal::{Camera, Clock, DeviceError, Lens, VirtualClock};
+
+use crate::config::Config;
+use crate::devices;
+
+/// Virtual time from one look at the camera to the next: the period of the simulated link's transfers.
+const STEP: Duration = Duration::from_millis(1);
+/// Virtual time without news after which the devices are given up before a run.
+const START_UP: Duration = Duration::from_secs(1);
+/// Events a batch holds: 1 ms at 65 million events a second.
+const BATCH_EVENTS: usize = 65_536;
+
+/// What a run in virtual time could not do.
+#[derive(Debug, thiserror::Error)]
+pub enum VirtualRigError {
+    /// The rig makes no sense.
+    #[error(transparent)]
+    Config(#[from] hil_sim::ConfigError),
+    /// The settings do not suit the lens.
+    #[error("{0}")]
+    Settings(String),
+    /// A device failed before there was a run.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The controller refused.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
+}
+
+/// A rig with its controller.
+pub struct VirtualRig {
+    clock: Arc<VirtualClock>,
+    rig: hil_sim::Rig,
+    camera: hil_sim::SimCamera,
+    lens: hil_sim::SimLens,
+    controller: Controller,
+    batch: EventBatch,
+    actions: Vec<Action>,
+    lens_poll: Duration,
+    next_poll: HostMicros,
+    camera_failed: bool,
+    lens_failed: bool,
+}
+
+impl std::fmt::Debug for VirtualRig {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("VirtualRig").field("rig", &self.rig).finish_non_exhaustive()
+    }
+}
+
+impl VirtualRig {
+    /// The rig of `config`, started.
+    ///
+    /// # Errors
+    /// [`VirtualRigError`] if the configuration makes no sense or a device does not start.
+    pub fn new(config: &Config) -> Result<Self, VirtualRigError> {
+        let clock = Arc::new(VirtualClock::new());
+        let rig = hil_sim::Rig::new(config.rig.clone(), clock.clone())?;
+        let (mut camera, lens) = rig.devices();
+        camera.start()?;
+        let settings =
+            config.controller(&lens.info()).map_err(|bad| VirtualRigError::Settings(bad.to_string()))?;
+        let mut virtual_rig = Self {
+            controller: Controller::new(settings, camera.info().geometry, clock.now()),
+            clock,
+            rig,
+            camera,
+            lens,
+            batch: EventBatch::with_capacity(BATCH_EVENTS),
+            actions: Vec::with_capacity(16),
+            lens_poll: config.lens_poll,
+            next_poll: HostMicros(0),
+            camera_failed: false,
+            lens_failed: false,
+        };
+        // The daemon's clocks have long been related when somebody asks for focus.
+        virtual_rig.run_for(START_UP);
+        Ok(virtual_rig)
+    }
+
+    /// The glass positions at which the scene is sharp, which only the simulator knows.
+    pub fn truth(&self) -> Vec<LensPosition> {
+        self.rig.truth()
+    }
+
+    /// The simulator.
+    pub fn rig(&self) -> &hil_sim::Rig {
+        &self.rig
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// Virtual time.
+    pub fn now(&self) -> HostMicros {
+        self.clock.now()
+    }
+
+    /// Gives the controller a command.
+    ///
+    /// # Errors
+    /// The controller's [`Refusal`].
+    pub fn command(&mut self, command: Command) -> Result<Accepted, Refusal> {
+        let now = self.clock.now();
+        let accepted = self.controller.command(command, now, &mut self.actions)?;
+        self.perform();
+        Ok(accepted)
+    }
+
+    /// Lets a millisecond pass.
+    pub fn step(&mut self) {
+        let now = self.clock.now() + STEP;
+        self.clock.advance_to(now);
+        self.read_camera(now);
+        if now >= self.next_poll {
+            self.next_poll = now + self.lens_poll;
+            self.sample_lens();
+        }
+        self.controller.handle(Input::Tick, self.clock.now(), &mut self.actions);
+        self.perform();
+    }
+
+    fn read_camera(&mut self, now: HostMicros) {
+        while !self.camera_failed {
+            if let Err(error) = self.camera.read(&mut self.batch, Duration::ZERO) {
+                self.camera_failed = true;
+                let input = Input::CameraFailed(devices::failure(&error));
+                self.controller.handle(input, now, &mut self.actions);
+                return;
+            }
+            self.controller.handle(Input::Batch(&self.batch), now, &mut self.actions);
+            if self.batch.events.is_empty() {
+                return;
+            }
+        }
+    }
+
+    fn sample_lens(&mut self) {
+        if self.lens_failed {
+            return;
+        }
+        match self.lens.sample() {
+            Ok(sample) => self.controller.handle(Input::Lens(sample), self.clock.now(), &mut self.actions),
+            Err(error) => self.fail_lens(&error),
+        }
+    }
+
+    fn fail_lens(&mut self, error: &DeviceError) {
+        self.lens_failed = true;
+        let input = Input::LensFailed(devices::failure(error));
+        self.controller.handle(input, self.clock.now(), &mut self.actions);
+    }
+
+    /// Does what was decided; what comes of a failure is decided and done too.
+    fn perform(&mut self) {
+        let mut done = 0;
+        while let Some(&action) = self.actions.get(done) {
+            done += 1;
+            if self.lens_failed {
+                continue;
+            }
+            if let Err(error) = devices::perform(action, &mut self.lens) {
+                self.fail_lens(&error);
+            }
+        }
+        self.actions.clear();
+    }
+
+    /// Lets `duration` pass.
+    pub fn run_for(&mut self, duration: Duration) {
+        let end = self.clock.now() + duration;
+        while self.clock.now() < end {
+            self.step();
+        }
+    }
+
+    /// Makes a focus run from trigger to report. `watch` is shown the state and the live curve after every step.
+    ///
+    /// # Errors
+    /// [`VirtualRigError::Refused`] if the controller does not take the request. A run that ends without focus is no error.
+    pub fn focus(
+        &mut self,
+        request: FocusRequest,
+        mut watch: impl FnMut(HostMicros, &Snapshot, &[CurvePoint]),
+    ) -> Result<RunReport, VirtualRigError> {
+        self.command(Command::Focus(request))?;
+        loop {
+            self.step();
+            let snapshot = self.controller.snapshot();
+            watch(self.clock.now(), &snapshot, self.controller.live_curve());
+            if snapshot.run.is_none()
+                && let Some(report) = self.controller.report()
+            {
+                return Ok(report.clone());
+            }
+        }
+    }
+}
