@@ -1,0 +1,15 @@
+//! One file for each subcommand: its options, and what it does.
+
+pub mod abort;
+pub mod analyze;
+pub mod completions;
+pub mod demo;
+pub mod devices;
+pub mod focus;
+pub mod info;
+pub mod mode;
+pub mod move_lens;
+pub mod report;
+pub mod simulate;
+pub mod status;
+pub mod watch;

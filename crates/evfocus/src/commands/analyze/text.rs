@@ -1,0 +1,59 @@
+//! What `analyze` prints for people.
+
+use std::io::Write;
+
+use evfocus_core::Method;
+
+use crate::output::Output;
+use crate::quantity::{count, rate, seconds};
+use crate::recording::{RecordingAnalysis, SweepAnalysis};
+
+pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::Result<()> {
+    match &analysis.verdict.outcome {
+        Ok(answer) => writeln!(out, "focused at {} counts ({})", answer.position, analysis.method)?,
+        Err(failure) => writeln!(out, "failed: {}: {failure}", failure.name())?,
+    }
+    if let Some(delay_us) = analysis.verdict.delay_us {
+        writeln!(out, "the two directions differ by twice {:.2} ms of lag and backlash", delay_us * 1e-3)?;
+    }
+    for sweep in &analysis.sweeps {
+        print_sweep(sweep, analysis.method, out)?;
+    }
+    Ok(())
+}
+
+fn print_sweep(sweep: &SweepAnalysis, decides: Method, out: &mut Output) -> anyhow::Result<()> {
+    let report = &sweep.report;
+    writeln!(
+        out,
+        "sweep from {} to {} counts in {}: {} events, peak {}",
+        report.from,
+        report.to,
+        seconds(report.end.micros_since(report.start) as f64),
+        count(report.on + report.off),
+        rate(report.peak_rate.0)
+    )?;
+    if let Err(failure) = &sweep.verdict {
+        writeln!(out, "  failed: {}: {failure}", failure.name())?;
+    }
+    if report.quality.has_flicker() && sweep.verdict.is_ok() {
+        writeln!(out, "  many events follow the {} Hz of the mains", report.quality.flicker_hz)?;
+    }
+    for method in Method::ALL {
+        let mark = if method == decides { '*' } else { ' ' };
+        match report.estimate(method) {
+            Some(Ok(said)) => writeln!(
+                out,
+                " {mark} {:<12} {:>8} counts at {}, {} steps, last interval {:.1} ms",
+                method.name(),
+                said.position.to_string(),
+                seconds(said.t_us),
+                said.iterations,
+                said.interval_us * 1e-3
+            )?,
+            Some(Err(error)) => writeln!(out, " {mark} {:<12} no answer: {error}", method.name())?,
+            None => {}
+        }
+    }
+    Ok(())
+}

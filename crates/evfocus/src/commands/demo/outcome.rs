@@ -1,0 +1,147 @@
+//! What `demo` says at the end.
+
+use std::io::Write;
+
+use evfocus_core::{LensPosition, Method, Outcome, Phase, RunReport};
+use hil_sim::RigConfig;
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::output::Output;
+use crate::quantity::count;
+
+/// Positions in lens counts, times in seconds of the rig's virtual time.
+#[derive(Debug, Serialize)]
+pub(super) struct DemoOutcome {
+    state: &'static str,
+    reason: Option<&'static str>,
+    message: String,
+    position: Option<f64>,
+    /// Where the scene is sharp; of two depths, the one nearer to the answer.
+    truth: f64,
+    error: Option<f64>,
+    /// Where the lens came to rest.
+    lens_position: f64,
+    method: &'static str,
+    delay_us: Option<f64>,
+    elapsed_s: f64,
+    events: u64,
+    seed: u64,
+    scene: &'static str,
+    camera: String,
+    estimators: Vec<Said>,
+    timings: Map<String, Value>,
+}
+
+#[derive(Debug, Serialize)]
+struct Said {
+    method: &'static str,
+    /// 1 for the first sweep, 2 for the way back.
+    sweep: usize,
+    position: f64,
+    error: f64,
+    iterations: u32,
+}
+
+impl DemoOutcome {
+    pub(super) fn of(report: &RunReport, truth: &[LensPosition], rig: &RigConfig) -> Self {
+        let position = match report.outcome {
+            Outcome::Focused { position } => Some(position),
+            Outcome::Failed(_) | Outcome::Aborted => None,
+        };
+        let truth = nearest(truth, position.unwrap_or(rig.focus)).unwrap_or(rig.focus);
+        let (state, reason, message) = match &report.outcome {
+            Outcome::Focused { position } => ("focused", None, format!("focus is at {position} counts")),
+            Outcome::Failed(failure) => ("failed", Some(failure.name()), failure.to_string()),
+            Outcome::Aborted => ("idle", Some("aborted"), String::from("the run was aborted")),
+        };
+        Self {
+            state,
+            reason,
+            message,
+            position: position.map(|position| position.0),
+            truth: truth.0,
+            error: position.map(|position| position.counts_from(truth)),
+            lens_position: report.position_after.0,
+            method: report.plan.method.name(),
+            delay_us: report.delay_us,
+            elapsed_s: report.elapsed().as_secs_f64(),
+            events: report.sweeps().map(|sweep| sweep.on + sweep.off).sum(),
+            seed: rig.seed,
+            scene: rig.scene.name(),
+            camera: rig.sensor.model.clone(),
+            estimators: said(report, truth),
+            timings: timings(report),
+        }
+    }
+
+    pub(super) fn is_focused(&self) -> bool {
+        self.position.is_some()
+    }
+
+    pub(super) fn print(&self, out: &mut Output) -> anyhow::Result<()> {
+        match (self.position, self.error) {
+            (Some(position), Some(error)) => {
+                writeln!(out, "focused at {position:.1} counts ({})", self.method)?;
+                writeln!(out, "truth      {:.1} counts, error {error:+.1}", self.truth)?;
+            }
+            _ => {
+                writeln!(out, "failed: {}: {}", self.reason.unwrap_or("unknown"), self.message)?;
+                writeln!(out, "truth      {:.1} counts", self.truth)?;
+            }
+        }
+        writeln!(out, "lens       {:.1} counts", self.lens_position)?;
+        if let Some(delay_us) = self.delay_us {
+            writeln!(out, "delay      {:.2} ms of lag and backlash", delay_us * 1e-3)?;
+        }
+        for said in &self.estimators {
+            let way = if said.sweep == 1 { "there" } else { "back" };
+            writeln!(
+                out,
+                "  {:<12} {way:<5} {:>8.1} counts, error {:+.1}, {} steps",
+                said.method, said.position, said.error, said.iterations
+            )?;
+        }
+        let timings: Vec<String> = self
+            .timings
+            .iter()
+            .filter_map(|(phase, seconds)| Some(format!("{phase} {:.2} s", seconds.as_f64()?)))
+            .collect();
+        writeln!(out, "time       {:.2} s: {}", self.elapsed_s, timings.join(", "))?;
+        writeln!(out, "events     {} from {} before {}", count(self.events), self.camera, self.scene)?;
+        writeln!(out, "seed       {}", self.seed)?;
+        Ok(())
+    }
+}
+
+fn nearest(truth: &[LensPosition], position: LensPosition) -> Option<LensPosition> {
+    truth.iter().copied().min_by(|a, b| a.distance(position).total_cmp(&b.distance(position)))
+}
+
+fn said(report: &RunReport, truth: LensPosition) -> Vec<Said> {
+    let mut said = Vec::new();
+    for (index, sweep) in report.sweeps().enumerate() {
+        for method in Method::ALL {
+            if let Some(Ok(estimate)) = sweep.estimate(method) {
+                said.push(Said {
+                    method: method.name(),
+                    sweep: index + 1,
+                    position: estimate.position.0,
+                    error: estimate.position.counts_from(truth),
+                    iterations: estimate.iterations,
+                });
+            }
+        }
+    }
+    said
+}
+
+/// Seconds spent in each phase that the run was in.
+fn timings(report: &RunReport) -> Map<String, Value> {
+    Phase::ALL
+        .iter()
+        .zip(&report.phases)
+        .filter(|(_, spent)| !spent.is_zero())
+        .map(|(phase, spent)| (phase.name().to_owned(), spent.as_secs_f64().into()))
+        .collect()
+}

@@ -1,0 +1,81 @@
+//! `evfocus move`: send the lens somewhere.
+
+use std::io::Write;
+
+use anyhow::bail;
+use clap::Args;
+use evfocus_ipc::client::Client;
+use serde_json::json;
+
+use crate::arguments::{SocketArguments, position};
+use crate::connection::{block_on, connect};
+use crate::exit::Exit;
+use crate::output::Output;
+
+/// Move the lens to a position, in counts
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  evfocus move 1985
+  evfocus move --wait 1985.5
+
+The command returns at once, with --wait when the lens has arrived. evfocus status names the positions that the lens accepts. \
+Refused while a focus run is under way.
+
+Units: counts of the lens.")]
+pub struct Arguments {
+    /// Where to, in lens counts
+    #[arg(value_parser = position, allow_negative_numbers = true)]
+    position: f64,
+    /// Return only when the lens stands there
+    #[arg(long)]
+    wait: bool,
+    #[command(flatten)]
+    socket: SocketArguments,
+}
+
+/// A lens that rests this near to its target, as a share of its range, has arrived.
+const NEAR_SHARE: f64 = 0.005;
+/// So many times in a row, about a second each, the lens may stand still before it has moved at all.
+const MOST_STILL: u32 = 3;
+
+/// Moves the lens.
+pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
+    let arrived = block_on(async {
+        let mut client = connect(&arguments.socket).await?;
+        client.move_to(arguments.position).await?;
+        if arguments.wait { wait(client, arguments.position).await.map(Some) } else { Ok(None) }
+    })?;
+    let mut out = Output::new();
+    if arguments.socket.json {
+        out.json(&json!({ "target": arguments.position, "arrived_at": arrived }))?;
+    } else if let Some(arrived) = arrived {
+        writeln!(out, "the lens is at {arrived:.1} counts")?;
+    } else {
+        writeln!(out, "the lens goes to {:.1} counts", arguments.position)?;
+    }
+    Ok(Exit::Done)
+}
+
+/// Returns where the lens has come to rest.
+async fn wait(client: Client, target: f64) -> anyhow::Result<f64> {
+    let mut changes = client.monitor().await?;
+    let (mut has_moved, mut still) = (false, 0);
+    while let Some(status) = changes.next().await? {
+        if let Some(fault) = status.fault {
+            bail!("the lens did not arrive: {fault}");
+        }
+        let Some(position) = status.lens_position else { continue };
+        let tolerance = status.lens_range.map_or(1.0, |range| NEAR_SHARE * (range.max - range.min));
+        if status.lens_moving {
+            has_moved = true;
+        } else if (position - target).abs() <= tolerance {
+            return Ok(position);
+        } else if has_moved || still == MOST_STILL {
+            bail!("the lens stands at {position:.1} counts, not at {target:.1}; evfocus status may say why");
+        } else {
+            still += 1;
+        }
+    }
+    bail!("evfocusd stopped telling where the lens is");
+}

@@ -1,0 +1,34 @@
+//! The exit statuses, the same for every command.
+
+use std::process::ExitCode;
+
+/// How a command ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Focused, or done.
+    Done,
+    /// Something went wrong; standard error says what.
+    Error,
+    /// The command line makes no sense.
+    Usage,
+    /// All went well, but the run ended without focus.
+    NoFocus,
+}
+
+impl Exit {
+    /// The status for a run that is or is not in focus.
+    pub fn of_run(focused: bool) -> Self {
+        if focused { Self::Done } else { Self::NoFocus }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        match exit {
+            Exit::Done => Self::SUCCESS,
+            Exit::Error => Self::from(1),
+            Exit::Usage => Self::from(2),
+            Exit::NoFocus => Self::from(3),
+        }
+    }
+}
