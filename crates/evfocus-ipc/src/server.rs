@@ -79,6 +79,7 @@ pub async fn serve<S: Service>(
 ) {
     let mut connections = JoinSet::new();
     let mut shutdown = std::pin::pin!(shutdown);
+    let mut was_full = false;
     loop {
         tokio::select! {
             () = &mut shutdown => break,
@@ -89,10 +90,16 @@ pub async fn serve<S: Service>(
                     while let Some(ended) = connections.try_join_next() {
                         log_panic(ended);
                     }
-                    if connections.len() < limits.clients {
-                        connections.spawn(connection::run(stream, Arc::clone(&service), limits));
-                    } else {
+                    let full = connections.len() >= limits.clients;
+                    if full && !was_full {
+                        // Once, not for each: a client that tries again and again must not fill the log.
+                        tracing::warn!(clients = limits.clients, "too many clients, turning more away");
+                    }
+                    was_full = full;
+                    if full {
                         turn_away(&stream, limits);
+                    } else {
+                        connections.spawn(connection::run(stream, Arc::clone(&service), limits));
                     }
                 }
                 Err(error) => {
@@ -115,11 +122,10 @@ pub async fn serve<S: Service>(
 
 /// Tells a client that it is one too many, if that can be done at once.
 fn turn_away(stream: &UnixStream, limits: Limits) {
-    tracing::warn!(clients = limits.clients, "too many clients, turning one away");
     if let Ok(bytes) = encode(&Error::TooManyClients { limit: limits.clients as u64 })
         && let Err(error) = stream.try_write(&bytes)
     {
-        tracing::debug!(%error, "could not tell the client so");
+        tracing::debug!(%error, "could not tell a client that it is one too many");
     }
 }
 
