@@ -517,7 +517,10 @@ impl Controller {
                 self.sweep.end_rest(now.since(since));
                 self.begin_sweep(0, now, actions);
             }
-            State::Verifying { since, answer, attempt } if now.since(since) >= self.config.rest => {
+            // The lens must have said since where it came to rest.
+            State::Verifying { since, answer, attempt }
+                if now.since(since) >= self.config.rest && self.lens_heard > since =>
+            {
                 self.verify(answer, attempt, now, actions);
             }
             State::Homing { since, .. } if now.since(since) >= self.config.homing_timeout => {

@@ -9,6 +9,9 @@ use crate::lens_trace::LensSample;
 use crate::report::{Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport};
 use crate::units::{HostMicros, LensPosition, LensSpeed};
 
+/// How far the link may be behind at the end of a sweep; a camera that is silent is given up sooner.
+const LINK_BACKLOG: Duration = Duration::from_secs(10);
+
 /// What belongs to the run under way.
 #[derive(Debug)]
 pub(super) struct Run {
@@ -129,7 +132,7 @@ impl Controller {
             return;
         };
         self.sweep.end(end);
-        let deadline = now + self.config.silence_timeout;
+        let deadline = now + LINK_BACKLOG;
         self.enter(State::Draining { leg, deadline }, now);
     }
 

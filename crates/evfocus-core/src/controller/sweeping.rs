@@ -125,6 +125,8 @@ impl SweepState {
 
     /// Adds a point to the live curve for every whole step that has been counted.
     pub(super) fn extend_live_curve(&mut self, clock: &ClockMap, reached: CameraMicros) {
+        // After a leap in time, only what the counter still holds: the effort stays bounded whatever the camera says.
+        self.live_until = self.live_until.max(self.recorder.counter().oldest());
         while reached.micros_since(self.live_until) >= LIVE_STEP_US && self.live_curve.len() < LIVE_POINTS {
             let (from, to) = (self.live_until.0, self.live_until.0 + LIVE_STEP_US);
             self.live_until = CameraMicros(to);

@@ -43,7 +43,7 @@ proptest! {
     /// Whatever the comparison says, the search ends within its bound and within its range.
     #[test]
     fn any_comparison_ends(
-        (start, length) in (-1e15..1e15_f64, prop_oneof![0.0..1e4_f64, 0.0..1e18_f64, Just(f64::INFINITY)]),
+        (start, length) in (-1e15..1e15_f64, prop_oneof![0.0..1e4_f64, 0.0..1e18_f64]),
         seed in any::<u64>(),
     ) {
         let mut random = Xorshift::new(seed);
@@ -53,7 +53,7 @@ proptest! {
         });
         let Ok(((from, to), iterations)) = golden_search((start, start + length), compare);
         prop_assert!(iterations <= MAX_ITERATIONS);
-        prop_assert!(from >= start && (to <= start + length || length.is_infinite()));
+        prop_assert!(from >= start && to <= start + length);
     }
 
     /// The answer is the same whether the counter's bins decide alone or the kept events settle what lies inside of them, up to the

@@ -1,5 +1,7 @@
 //! Event streams out of numbers that are the same on every machine.
 
+use core::time::Duration;
+
 use evfocus_core::{
     CameraMicros, Event, Geometry, LensPosition, LensTrace, Polarity, SweepCapacity, SweepRecorder,
 };
@@ -41,9 +43,12 @@ pub(crate) fn event(random: &mut Xorshift, t_us: i64) -> Event {
 
 /// `events` as a recorder holds them after the sweep; `kept` is the room for single events.
 pub(crate) fn record(events: &[Event], kept: usize) -> SweepRecorder {
-    let capacity = SweepCapacity { events: kept, ..SweepCapacity::default() };
-    let mut recorder = SweepRecorder::new(GEOMETRY, capacity);
-    recorder.start(events.first().map_or(CameraMicros(0), |event| event.t));
+    let at = |event: Option<&Event>| event.map_or(CameraMicros(0), |event| event.t);
+    let (first, last) = (at(events.first()), at(events.last()));
+    let longest = last.since(first) + Duration::from_millis(1);
+    let mut recorder =
+        SweepRecorder::new(GEOMETRY, SweepCapacity { longest, events: kept, ..SweepCapacity::default() });
+    recorder.start(first);
     recorder.feed(events);
     recorder
 }
