@@ -209,7 +209,10 @@ fn mismatch_spreads_the_pixels() {
 
 #[test]
 fn several_thresholds_within_a_step_make_several_events() {
-    let config = with(flickering(), |sensor| (sensor.on_threshold, sensor.off_threshold) = (0.03, 0.03));
+    let config = with(flickering(), |sensor| {
+        sensor.geometry = Geometry { width: 16, height: 12 };
+        (sensor.on_threshold, sensor.off_threshold) = (0.03, 0.03);
+    });
     let (events, _) = second(&config);
     let busiest = by_pixel(&events)
         .values()
