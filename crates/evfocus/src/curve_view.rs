@@ -48,16 +48,17 @@ impl CurveView {
     /// Draws `frame` in place of the one before.
     pub(crate) fn draw(&mut self, frame: CurveFrame<'_>, out: &mut Output) -> std::io::Result<()> {
         let lines = self.lines(frame);
-        let mut text = String::new();
+        // One write for the whole frame, so that the terminal never shows half of it.
+        let mut text = Vec::new();
         if self.lines_drawn > 0 {
-            text.push_str(&format!("\x1b[{}A", self.lines_drawn));
+            write!(text, "\x1b[{}A", self.lines_drawn)?;
         }
         for line in &lines {
             // Clears what the frame before left to the right.
-            text.push_str(&format!("\r{line}\x1b[K\n"));
+            write!(text, "\r{line}\x1b[K\r\n")?;
         }
         self.lines_drawn = lines.len();
-        out.write_all(text.as_bytes())?;
+        out.write_all(&text)?;
         out.flush()
     }
 
@@ -84,7 +85,10 @@ impl CurveView {
                 *number += 1;
             }
         }
-        sums.into_iter().map(|(sum, number)| (number > 0).then(|| sum / f64::from(number))).collect()
+        let mut rates: Vec<Option<f64>> =
+            sums.into_iter().map(|(sum, number)| (number > 0).then(|| sum / f64::from(number))).collect();
+        fill_gaps(&mut rates);
+        rates
     }
 
     fn column(&self, position: f64) -> Option<usize> {
@@ -103,6 +107,16 @@ impl CurveView {
             *place = '▲';
         }
         format!("{}{}", " ".repeat(GUTTER), foot.into_iter().collect::<String>())
+    }
+}
+
+/// Where the lens goes faster than points come, a column between two others takes the rate of the one before.
+fn fill_gaps(rates: &mut [Option<f64>]) {
+    let Some(end) = rates.iter().rposition(Option::is_some) else { return };
+    let mut before = None;
+    for rate in rates.iter_mut().take(end) {
+        before = rate.or(before);
+        *rate = before;
     }
 }
 
@@ -125,7 +139,7 @@ mod tests {
         let points: Vec<(f64, f64)> = (0..50).map(|p| (f64::from(p), f64::from(p))).collect();
         let lines = view.lines(CurveFrame { points: &points, lens: Some(50.0), title: "t" });
         assert_eq!(lines.len(), ROWS + 3);
-        assert!(lines[1].contains("49 events/s") && lines[1].ends_with('█'), "{}", lines[1]);
+        assert!(lines[1].contains("48 events/s") && lines[1].ends_with('█'), "{}", lines[1]);
         assert!(lines[ROWS].chars().count() < GUTTER + 27, "{}", lines[ROWS]);
         assert!(lines[ROWS + 2].contains('▲') && lines[ROWS + 2].ends_with("100 counts"));
     }

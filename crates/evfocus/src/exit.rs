@@ -1,5 +1,6 @@
 //! The exit statuses, the same for every command.
 
+use std::fmt;
 use std::process::ExitCode;
 
 /// How a command ended.
@@ -20,6 +21,11 @@ impl Exit {
     pub fn of_run(focused: bool) -> Self {
         if focused { Self::Done } else { Self::NoFocus }
     }
+
+    /// The status for `error`.
+    pub fn of_error(error: &anyhow::Error) -> Self {
+        if error.is::<UsageError>() { Self::Usage } else { Self::Error }
+    }
 }
 
 impl From<Exit> for ExitCode {
@@ -32,3 +38,16 @@ impl From<Exit> for ExitCode {
         }
     }
 }
+
+/// Arguments that are well-formed one by one and make no sense together, or on this rig: status 2 like those that clap
+/// refuses.
+#[derive(Debug)]
+pub struct UsageError(pub String);
+
+impl fmt::Display for UsageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for UsageError {}

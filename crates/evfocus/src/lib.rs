@@ -42,7 +42,7 @@ pub fn main() -> ExitCode {
         Ok(exit) => exit.into(),
         Err(error) => {
             output::report_error(&error);
-            Exit::Error.into()
+            Exit::of_error(&error).into()
         }
     }
 }

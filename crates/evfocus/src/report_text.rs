@@ -36,7 +36,11 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
         writeln!(out, "the lens stands at {position:.1} counts")?;
     }
     if let Some(delay_us) = report.delay_us {
-        writeln!(out, "the two directions differ by twice {:.2} ms of lag and backlash", delay_us * 1e-3)?;
+        writeln!(
+            out,
+            "half the difference of the two directions is {:.2} ms (lag and backlash)",
+            delay_us * 1e-3
+        )?;
     }
     let events = &report.events;
     writeln!(

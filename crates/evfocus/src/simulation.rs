@@ -134,12 +134,12 @@ impl Session {
     fn read(&mut self) -> anyhow::Result<()> {
         loop {
             self.camera.read(&mut self.batch, Duration::ZERO)?;
-            if self.batch.reached.is_none() && self.batch.events.is_empty() {
+            self.lost += self.batch.lost;
+            if self.batch.events.is_empty() {
                 return Ok(());
             }
             self.recording.write(&self.batch.events)?;
             self.events += self.batch.events.len() as u64;
-            self.lost += self.batch.lost;
         }
     }
 

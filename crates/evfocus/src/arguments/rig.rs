@@ -5,6 +5,7 @@ use evfocus_core::LensPosition;
 use hil_sim::{CameraModel, Flicker, LensConfig, Light, MotionConfig, RigConfig, Scene};
 
 use super::{choices, position};
+use crate::exit::UsageError;
 
 /// Repeats a simulation whose seed was printed, without an option.
 const SEED_VARIABLE: &str = "EVFOCUS_SIM_SEED";
@@ -15,9 +16,9 @@ const ROLL_RAD_PER_PX: f64 = 0.0015;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Simulated rig")]
 pub struct RigArguments {
-    /// What the camera looks at
-    #[arg(long, value_name = "NAME", default_value = "dead-leaves", value_parser = choices(Scene::ALL, Scene::name))]
-    pub scene: Scene,
+    /// What the camera looks at [default: text for demo, dead-leaves for simulate]
+    #[arg(long, value_name = "NAME", value_parser = choices(Scene::ALL, Scene::name))]
+    pub scene: Option<Scene>,
     /// How much light there is: light (more than 100 lux) or dark (about 1 lux)
     #[arg(long, value_name = "NAME", default_value = "light", value_parser = choices(Light::ALL, Light::name))]
     pub light: Light,
@@ -25,19 +26,25 @@ pub struct RigArguments {
     #[arg(long, value_name = "NAME", default_value = "davis346", value_parser = choices(CameraModel::ALL, CameraModel::name))]
     pub camera: CameraModel,
     /// Hand shake, in pixels RMS; 2 is a hand, 7 is violent
-    #[arg(long, value_name = "PX_RMS", default_value_t = 0.0)]
+    #[arg(long, value_name = "PX_RMS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub shake: f64,
     /// Steady motion of the scene to the right, in pixels per second
     #[arg(long, value_name = "PX_PER_S", default_value_t = 0.0, allow_negative_numbers = true)]
     pub velocity: f64,
     /// Flicker of the light, in Hz: 100 or 120 for lamps at the mains
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub flicker: Option<f64>,
     /// How much of the light flickers, 0 to 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.1, requires = "flicker")]
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = 0.1,
+        requires = "flicker",
+        allow_negative_numbers = true
+    )]
     pub flicker_depth: f64,
     /// The lens position at which the scene is sharp, in counts (220 to 3750); drawn from the seed if left out
-    #[arg(long, value_name = "POSITION", value_parser = position)]
+    #[arg(long, value_name = "POSITION", value_parser = position, allow_negative_numbers = true)]
     pub focus: Option<f64>,
     /// A worn lens: backlash of 15 counts, overshoot, uneven speed, noisy and late positions
     #[arg(long)]
@@ -52,19 +59,18 @@ impl RigArguments {
     pub fn seed(&self) -> anyhow::Result<u64> {
         match (self.seed, std::env::var(SEED_VARIABLE)) {
             (Some(seed), _) => Ok(seed),
-            (None, Ok(text)) => text
-                .trim()
-                .parse()
-                .map_err(|_| anyhow::anyhow!("{SEED_VARIABLE} is {text:?}; it must be a whole number")),
+            (None, Ok(text)) => text.trim().parse().map_err(|_| {
+                UsageError(format!("{SEED_VARIABLE} is {text:?}; it must be a whole number")).into()
+            }),
             (None, Err(_)) => Ok(1),
         }
     }
 
-    /// The rig that the options describe.
-    pub fn rig(&self) -> anyhow::Result<RigConfig> {
+    /// The rig that the options describe, before `default_scene` if they name none.
+    pub fn rig(&self, default_scene: Scene) -> anyhow::Result<RigConfig> {
         let seed = self.seed()?;
         let mut rig = RigConfig::preset(self.camera, self.light);
-        rig.scene = self.scene;
+        rig.scene = self.scene.unwrap_or(default_scene);
         rig.motion = MotionConfig {
             shake_px_rms: self.shake,
             roll_rad_rms: ROLL_RAD_PER_PX * self.shake,
@@ -81,6 +87,7 @@ impl RigArguments {
         let second = rig.focus.0 + 0.2 * range.length();
         rig.second_focus = range.clamp(LensPosition(second));
         rig.seed = seed;
+        rig.validate().map_err(|error| UsageError(format!("no such rig: {error}")))?;
         Ok(rig)
     }
 }

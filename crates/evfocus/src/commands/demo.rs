@@ -10,6 +10,7 @@ use clap::Args;
 use evfocus_core::controller::FocusRequest;
 use evfocus_core::{LensPosition, Method, RunReport};
 use evfocusd::{Config, VirtualRig};
+use hil_sim::Scene;
 
 use crate::arguments::{RigArguments, choices};
 use crate::exit::Exit;
@@ -31,9 +32,9 @@ Units: positions in lens counts, elapsed_s in seconds of the simulated rig's tim
 
 Exit status: 0 focused, 1 an error, 2 wrong usage, 3 the run ended without focus.")]
 pub struct Arguments {
-    /// Focus measure and search
-    #[arg(long, value_name = "NAME", default_value = "egs", value_parser = choices(&Method::ALL, Method::name))]
-    method: Method,
+    /// Focus measure and search; the daemon's default if left out
+    #[arg(long, value_name = "NAME", value_parser = choices(&Method::ALL, Method::name))]
+    method: Option<Method>,
     /// Draw the focus curves, every method's answer and the truth into this file
     #[arg(long, value_name = "FILE.svg")]
     report: Option<PathBuf>,
@@ -47,14 +48,14 @@ pub struct Arguments {
 /// Makes the run and says how it went.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     let mut out = Output::new();
-    let config = Config { rig: arguments.rig.rig()?, ..Config::simulated()? };
+    let config = Config { rig: arguments.rig.rig(Scene::Text)?, ..Config::simulated()? };
     let mut live = if out.is_terminal() && !arguments.json {
         live::LiveDemo::on_terminal(config.rig.lens.range)
     } else {
         live::LiveDemo::silent()
     };
     let mut rig = VirtualRig::new(&config)?;
-    let request = FocusRequest { method: Some(arguments.method), ..FocusRequest::default() };
+    let request = FocusRequest { method: arguments.method, ..FocusRequest::default() };
     let report = rig.focus(request, |now, snapshot, curve| live.show(now, snapshot, curve, &mut out))?;
     live.finish()?;
     let truth = rig.truth();
@@ -64,9 +65,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     }
     let outcome = outcome::DemoOutcome::of(&report, &truth, &config.rig);
     if arguments.json {
-        out.json(&outcome)?
+        out.json(&outcome)?;
     } else {
-        outcome.print(&mut out)?
+        outcome.print(&mut out)?;
     }
     Ok(Exit::of_run(outcome.is_focused()))
 }

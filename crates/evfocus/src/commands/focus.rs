@@ -11,7 +11,7 @@ use evfocus_ipc::{FocusRequest, LensRange, Phase, Progress, Report, State};
 use crate::arguments::{SocketArguments, duration, position, speed};
 use crate::connection::{block_on, connect};
 use crate::curve_view::{CurveFrame, CurveView};
-use crate::exit::Exit;
+use crate::exit::{Exit, UsageError};
 use crate::output::{Output, warn};
 use crate::report_text;
 
@@ -42,7 +42,7 @@ pub struct Arguments {
     #[arg(long, value_name = "POSITION", value_parser = position, requires = "from", allow_negative_numbers = true)]
     to: Option<f64>,
     /// Speed of the sweep, in counts per second
-    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    #[arg(long, value_name = "SPEED", value_parser = speed, allow_negative_numbers = true)]
     speed: Option<LensSpeed>,
     /// Accumulation interval of er-fixed, with its unit: 55ms, 0.055s
     #[arg(long, value_name = "DURATION", value_parser = duration)]
@@ -69,7 +69,7 @@ impl Arguments {
 /// Starts a run and follows it to its end.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     if let Some((from, to)) = arguments.from.zip(arguments.to).filter(|(from, to)| from >= to) {
-        bail!("--from {from} must lie below --to {to}");
+        return Err(UsageError(format!("--from {from} must lie below --to {to}")).into());
     }
     block_on(focus(arguments))
 }
@@ -86,9 +86,9 @@ async fn focus(arguments: &Arguments) -> anyhow::Result<Exit> {
         bail!("left at the second Ctrl-C; evfocus status tells whether the run has stopped");
     };
     if arguments.socket.json {
-        out.json(&report)?
+        out.json(&report)?;
     } else {
-        report_text::print_outcome(&report, &mut out)?
+        report_text::print_outcome(&report, &mut out)?;
     }
     Ok(Exit::of_run(report.result.state == State::Focused))
 }

@@ -61,9 +61,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     let info = Info::of(arguments, &summary);
     let mut out = Output::new();
     if arguments.json {
-        out.json(&info)?
+        out.json(&info)?;
     } else {
-        info.print(&mut out)?
+        info.print(&mut out)?;
     }
     Ok(Exit::Done)
 }

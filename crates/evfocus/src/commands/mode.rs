@@ -41,9 +41,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     block_on(async { Ok(connect(&arguments.socket).await?.set_mode(mode).await?) })?;
     let mut out = Output::new();
     if arguments.socket.json {
-        out.json(&json!({ "mode": mode }))?
+        out.json(&json!({ "mode": mode }))?;
     } else {
-        writeln!(out, "mode {mode}")?
+        writeln!(out, "mode {mode}")?;
     }
     Ok(Exit::Done)
 }

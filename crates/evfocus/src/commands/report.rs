@@ -43,9 +43,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     }
     let mut out = Output::new();
     if arguments.socket.json {
-        out.json(&report)?
+        out.json(&report)?;
     } else {
-        report_text::print(&report, &mut out)?
+        report_text::print(&report, &mut out)?;
     }
     Ok(Exit::Done)
 }

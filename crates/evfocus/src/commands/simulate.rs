@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use evfocus_core::LensSpeed;
+use hil_sim::Scene;
 
 use crate::arguments::{RigArguments, duration, speed};
 use crate::exit::Exit;
@@ -39,10 +40,10 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.json")]
     truth: PathBuf,
     /// Speed of the sweep, in counts per second [default: 1765, the whole range in 2 s]
-    #[arg(long, value_name = "SPEED", value_parser = speed, conflicts_with = "sweep_s")]
+    #[arg(long, value_name = "SPEED", value_parser = speed, allow_negative_numbers = true, conflicts_with = "sweep_s")]
     speed: Option<LensSpeed>,
     /// Time of the sweep at full speed, in seconds, instead of the speed
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     sweep_s: Option<f64>,
     /// Sweep back as well
     #[arg(long)]
@@ -65,7 +66,7 @@ pub struct Arguments {
 
 /// Simulates, writes the files and says what is in them.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
-    let rig = arguments.rig.rig()?;
+    let rig = arguments.rig.rig(Scene::DeadLeaves)?;
     let speed = match (arguments.speed, arguments.sweep_s) {
         (Some(speed), _) => speed,
         (None, Some(seconds)) => LensSpeed::new(rig.lens.range.length() / seconds)?,
@@ -89,6 +90,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
         writeln!(out, "sharp at {:.1} counts", truth.position)?;
     }
     Ok(Exit::Done)
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if (0.01..=1000.0).contains(&value) => Ok(value),
+        _ => Err(format!("{text:?} is not a number of seconds from 0.01 to 1000")),
+    }
 }
 
 fn frames_per_second(text: &str) -> Result<f64, String> {

@@ -31,9 +31,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     let status = block_on(async { Ok(connect(&arguments.socket).await?.status().await?) })?;
     let mut out = Output::new();
     if arguments.socket.json {
-        out.json(&status)?
+        out.json(&status)?;
     } else {
-        print(&status, &mut out)?
+        print(&status, &mut out)?;
     }
     Ok(Exit::Done)
 }

@@ -34,9 +34,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
         let mut changes = connect(&arguments.socket).await?.monitor().await?;
         while let Some(status) = changes.next().await? {
             if arguments.socket.json {
-                out.json_line(&status)?
+                out.json_line(&status)?;
             } else {
-                print(&status, &mut out)?
+                print(&status, &mut out)?;
             }
             if out.is_closed() {
                 break;

@@ -58,6 +58,8 @@ fn draw_curves(plot: &FocusPlot, area: &Area<'_>) -> anyhow::Result<()> {
         .y_desc(format!("event rate ({unit})"))
         .x_labels(10)
         .y_labels(6)
+        .x_label_formatter(&|position| format!("{position:.0}"))
+        .y_label_formatter(&|rate| format!("{rate}"))
         .light_line_style(TRANSPARENT)
         .bold_line_style(GRID)
         .axis_style(TEXT)

@@ -80,19 +80,20 @@ impl DemoOutcome {
     }
 
     pub(super) fn print(&self, out: &mut Output) -> anyhow::Result<()> {
-        match (self.position, self.error) {
-            (Some(position), Some(error)) => {
-                writeln!(out, "focused at {position:.1} counts ({})", self.method)?;
-                writeln!(out, "truth      {:.1} counts, error {error:+.1}", self.truth)?;
-            }
-            _ => {
-                writeln!(out, "failed: {}: {}", self.reason.unwrap_or("unknown"), self.message)?;
-                writeln!(out, "truth      {:.1} counts", self.truth)?;
-            }
+        if let (Some(position), Some(error)) = (self.position, self.error) {
+            writeln!(out, "focused at {position:.1} counts ({})", self.method)?;
+            writeln!(out, "truth      {:.1} counts, error {error:+.1}", self.truth)?;
+        } else {
+            writeln!(out, "failed: {}: {}", self.reason.unwrap_or("unknown"), self.message)?;
+            writeln!(out, "truth      {:.1} counts", self.truth)?;
         }
         writeln!(out, "lens       {:.1} counts", self.lens_position)?;
         if let Some(delay_us) = self.delay_us {
-            writeln!(out, "delay      {:.2} ms of lag and backlash", delay_us * 1e-3)?;
+            writeln!(
+                out,
+                "delay      {:.2} ms: half the difference of the two directions (lag and backlash)",
+                delay_us * 1e-3
+            )?;
         }
         for said in &self.estimators {
             let way = if said.sweep == 1 { "there" } else { "back" };

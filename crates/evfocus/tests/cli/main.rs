@@ -1,0 +1,13 @@
+//! The program from outside: arguments in, output and exit status out.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that panics has failed, as it should"
+)]
+
+mod analyze;
+mod bad_input;
+mod demo;
+mod program;
