@@ -15,7 +15,7 @@ pub(crate) fn print_outcome(report: &Report, out: &mut Output) -> anyhow::Result
             let method = result.method.as_deref().unwrap_or("no method");
             writeln!(out, "focused at {position:.1} counts ({method}) in {:.1} s", report.elapsed_s)?;
         }
-        (State::Idle, _) => writeln!(out, "aborted: {}", result.message)?,
+        (State::Idle, _) => writeln!(out, "{}", result.message)?,
         _ => writeln!(out, "failed: {}: {}", result.reason.as_deref().unwrap_or("unknown"), result.message)?,
     }
     for warning in &report.warnings {
@@ -36,11 +36,7 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
         writeln!(out, "the lens stands at {position:.1} counts")?;
     }
     if let Some(delay_us) = report.delay_us {
-        writeln!(
-            out,
-            "half the difference of the two directions is {:.2} ms (lag and backlash)",
-            delay_us * 1e-3
-        )?;
+        writeln!(out, "delay {:.2} ms (half the difference of the two directions)", delay_us * 1e-3)?;
     }
     let events = &report.events;
     writeln!(

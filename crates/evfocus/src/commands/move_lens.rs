@@ -1,6 +1,7 @@
 //! `evfocus move`: send the lens somewhere.
 
 use std::io::Write;
+use std::time::Duration;
 
 use anyhow::bail;
 use clap::Args;
@@ -36,8 +37,8 @@ pub struct Arguments {
 
 /// A lens that rests this near to its target, as a share of its range, has arrived.
 const NEAR_SHARE: f64 = 0.005;
-/// So many times in a row, about a second each, the lens may stand still before it has moved at all.
-const MOST_STILL: u32 = 3;
+/// How long the lens may stand still before it starts to move.
+const LONGEST_STILL: Duration = Duration::from_secs(3);
 
 /// Moves the lens.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
@@ -60,8 +61,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
 /// Returns where the lens has come to rest.
 async fn wait(client: Client, target: f64) -> anyhow::Result<f64> {
     let mut changes = client.monitor().await?;
-    let (mut has_moved, mut still) = (false, 0);
-    while let Some(status) = changes.next().await? {
+    let mut has_moved = false;
+    let mut patience = std::pin::pin!(tokio::time::sleep(LONGEST_STILL));
+    loop {
+        let status = tokio::select! {
+            status = changes.next() => status?,
+            () = &mut patience, if !has_moved => bail!("the lens does not move; evfocus status may say why"),
+        };
+        let Some(status) = status else { bail!("evfocusd stopped telling where the lens is") };
         if let Some(fault) = status.fault {
             bail!("the lens did not arrive: {fault}");
         }
@@ -71,11 +78,8 @@ async fn wait(client: Client, target: f64) -> anyhow::Result<f64> {
             has_moved = true;
         } else if (position - target).abs() <= tolerance {
             return Ok(position);
-        } else if has_moved || still == MOST_STILL {
+        } else if has_moved {
             bail!("the lens stands at {position:.1} counts, not at {target:.1}; evfocus status may say why");
-        } else {
-            still += 1;
         }
     }
-    bail!("evfocusd stopped telling where the lens is");
 }

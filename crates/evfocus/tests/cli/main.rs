@@ -9,5 +9,6 @@
 
 mod analyze;
 mod bad_input;
+mod daemon;
 mod demo;
 mod program;

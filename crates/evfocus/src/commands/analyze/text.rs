@@ -14,11 +14,7 @@ pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::R
         Err(failure) => writeln!(out, "failed: {}: {failure}", failure.name())?,
     }
     if let Some(delay_us) = analysis.verdict.delay_us {
-        writeln!(
-            out,
-            "half the difference of the two directions is {:.2} ms (lag and backlash)",
-            delay_us * 1e-3
-        )?;
+        writeln!(out, "delay {:.2} ms (half the difference of the two directions)", delay_us * 1e-3)?;
     }
     for sweep in &analysis.sweeps {
         print_sweep(sweep, analysis.method, out)?;

@@ -91,7 +91,7 @@ impl DemoOutcome {
         if let Some(delay_us) = self.delay_us {
             writeln!(
                 out,
-                "delay      {:.2} ms: half the difference of the two directions (lag and backlash)",
+                "delay      {:.2} ms (half the difference of the two directions)",
                 delay_us * 1e-3
             )?;
         }

@@ -1,0 +1,155 @@
+//! The commands that speak to a daemon, against one on a simulated rig in a thread of the test.
+
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+use std::thread::JoinHandle;
+
+use evfocusd::{Config, daemon};
+use serde_json::Value;
+use tokio::sync::oneshot;
+
+use crate::program::{number, stderr, stdout};
+
+/// A daemon that runs until it is dropped.
+struct Daemon {
+    folder: tempfile::TempDir,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Daemon {
+    fn start() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let config = Config {
+            socket: folder.path().join("socket"),
+            state_dir: folder.path().join("reports"),
+            ..Config::simulated().unwrap()
+        };
+        let (ready, is_ready) = std::sync::mpsc::channel();
+        let (stop, stopped) = oneshot::channel::<()>();
+        let thread = std::thread::spawn(move || {
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+            let until = async { drop(stopped.await) };
+            runtime.block_on(daemon::run(config, move || ready.send(()).unwrap(), until)).unwrap();
+        });
+        is_ready.recv().expect("the daemon starts");
+        let daemon = Self { folder, stop: Some(stop), thread: Some(thread) };
+        daemon.wait_for_devices();
+        daemon
+    }
+
+    /// Clients are served before camera and lens have said that they are there.
+    fn wait_for_devices(&self) {
+        let are_there = |status: &Value| status["camera"].is_string() && status["lens_position"].is_number();
+        assert!((0..500).any(|_| are_there(&self.json(&["status", "--json"]))), "no camera or no lens");
+    }
+
+    fn socket(&self) -> PathBuf {
+        self.folder.path().join("socket")
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_evfocus"));
+        command.args(arguments).env("EVFOCUS_SOCKET", self.socket());
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    fn json(&self, arguments: &[&str]) -> Value {
+        let output = self.run(arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+        serde_json::from_str(&stdout(&output)).unwrap()
+    }
+
+    fn refuses(&self, arguments: &[&str], parts: &[&str]) {
+        let output = self.run(arguments);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {}", stdout(&output));
+        for part in parts {
+            assert!(stderr(&output).contains(part), "{arguments:?}: no {part:?} in {}", stderr(&output));
+        }
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        let ended = self.thread.take().unwrap().join();
+        assert!(ended.is_ok() || std::thread::panicking(), "the daemon ended badly");
+    }
+}
+
+#[test]
+fn a_session_with_the_daemon() {
+    let daemon = Daemon::start();
+    let status = daemon.json(&["status", "--json"]);
+    assert_eq!((&status["mode"], &status["state"]), (&"auto".into(), &"idle".into()));
+    assert_eq!(daemon.json(&["devices", "--json"]).as_array().map(Vec::len), Some(2));
+    for command in ["status", "devices"] {
+        assert!(stdout(&daemon.run(&[command])).contains("simulated"), "{command}");
+    }
+    daemon.refuses(&["report"], &["no report"]);
+    daemon.refuses(&["move", "9999"], &["9999", "3750"]);
+    daemon.refuses(&["focus", "--method", "guess"], &["guess", "egs"]);
+    assert_eq!(daemon.json(&["abort", "--json"])["run_id"], Value::Null);
+
+    let moved = daemon.json(&["move", "400", "--wait", "--json"]);
+    assert!((number(&moved, "arrived_at") - 400.0).abs() < 20.0, "{moved}");
+
+    assert_eq!(daemon.json(&["mode", "manual", "--json"])["mode"], "manual");
+    daemon.refuses(&["focus"], &["manual", "auto"]);
+    assert_eq!(daemon.json(&["mode", "auto", "--json"])["mode"], "auto");
+}
+
+#[test]
+fn a_run_is_followed_to_its_report() {
+    let daemon = Daemon::start();
+    let focus = ["focus", "--from", "1500", "--to", "2500", "--one-way", "--method", "er-fixed"];
+    let output = daemon.run(&[&focus[..], &["--interval", "50ms", "--json"]].concat());
+    let report: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    // A machine that is too busy may make the run fail, but never without a reason.
+    match output.status.code() {
+        Some(0) => assert!((number(&report["result"], "position") - 1985.0).abs() < 400.0, "{report}"),
+        Some(3) => assert!(report["result"]["reason"].is_string(), "{report}"),
+        other => panic!("status {other:?}: {}", stderr(&output)),
+    }
+    assert_eq!(report["request"]["interval_us"], 50_000);
+    assert_eq!(report["request"]["directions"], "forward");
+    let plot = daemon.folder.path().join("run.svg");
+    let again = daemon.json(&["report", "1", "--json", "--plot", plot.to_str().unwrap()]);
+    assert_eq!(again, report);
+    assert!(std::fs::read_to_string(plot).unwrap().contains("<svg"));
+    assert!(stdout(&daemon.run(&["report"])).contains("sweep from 1500.0 to 2500.0"));
+}
+
+#[test]
+fn an_aborted_run_is_status_3() {
+    let daemon = Daemon::start();
+    let mut focus = daemon.command(&["focus", "--json"]).stdout(Stdio::piped()).spawn().unwrap();
+    let aborted = loop {
+        let run = daemon.json(&["status", "--json"])["run_id"].clone();
+        if !run.is_null() {
+            assert_eq!(daemon.json(&["abort", "--json"])["run_id"], run);
+            break run;
+        }
+        assert!(focus.try_wait().unwrap().is_none(), "the run ended before it could be aborted");
+    };
+    let output = focus.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let report: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((&report["run_id"], &report["result"]["state"]), (&aborted, &"idle".into()));
+}
+
+#[test]
+fn watching_ends_with_its_reader() {
+    use std::io::BufRead;
+    let daemon = Daemon::start();
+    let mut watch = daemon.command(&["watch", "--json"]).stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = std::io::BufReader::new(watch.stdout.take().unwrap()).lines();
+    let status: Value = serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap();
+    assert_eq!(status["mode"], "auto");
+    drop(lines);
+    assert_eq!(watch.wait().unwrap().code(), Some(0));
+}
