@@ -78,6 +78,10 @@ impl Analyzer {
                 }
             }
         }
+        // The most telling reason first: lamps fill the link, and what fills the link is lost.
+        if quality.flicker_depth > limits.largest_flicker_depth {
+            return Err(Failure::Flicker { hz: quality.flicker_hz });
+        }
         if report.lost as f64 > limits.largest_lost_share * (counted + report.lost) as f64 {
             return Err(Failure::EventsLost { lost: report.lost, counted });
         }
@@ -86,9 +90,6 @@ impl Analyzer {
         }
         if quality.is_flat() {
             return Err(Failure::Flat);
-        }
-        if quality.flicker_depth > limits.largest_flicker_depth {
-            return Err(Failure::Flicker { hz: quality.flicker_hz });
         }
         match report.estimate(method) {
             Some(Err(error)) => Err(Failure::NoAnswer(error)),

@@ -65,7 +65,7 @@ pub enum Input<'a> {
     LensFailed(DeviceFailure),
     /// The lens is (again) there.
     LensReady,
-    /// Time went on.
+    /// Time went on, and every other input up to now has been handed in: rests end, silences and deadlines are noticed.
     Tick,
 }
 
@@ -394,9 +394,8 @@ impl Controller {
                 self.lens_ready = true;
                 self.lens_heard = now;
             }
-            Input::Tick => {}
+            Input::Tick => self.watch_time(now, actions),
         }
-        self.watch_time(now, actions);
     }
 
     fn on_batch(&mut self, batch: &EventBatch, now: HostMicros, actions: &mut Vec<Action>) {
@@ -437,7 +436,7 @@ impl Controller {
         match self.state {
             State::Idle | State::Resting { .. } | State::Verifying { .. } => {}
             State::Draining { .. } => self.sweep.add_lens(&sample),
-            State::Moving(mut motion) => match motion.observe(&sample, now) {
+            State::Moving(mut motion) => match motion.observe(&sample) {
                 Progress::UnderWay => self.state = State::Moving(motion),
                 Progress::Arrived => self.enter(State::Idle, now),
                 Progress::Failed(_) | Progress::Overdue => self.give_up_motion(now, actions),
@@ -450,7 +449,7 @@ impl Controller {
                     self.go_to_start(now, actions);
                 }
             }
-            State::ToStart(mut motion) => match motion.observe(&sample, now) {
+            State::ToStart(mut motion) => match motion.observe(&sample) {
                 Progress::UnderWay => self.state = State::ToStart(motion),
                 Progress::Arrived => {
                     self.sweep.begin_rest();
@@ -461,7 +460,7 @@ impl Controller {
             },
             State::Sweeping { leg, mut motion } => {
                 self.sweep.add_lens(&sample);
-                match motion.observe(&sample, now) {
+                match motion.observe(&sample) {
                     Progress::UnderWay => self.state = State::Sweeping { leg, motion },
                     Progress::Arrived => self.drain(leg, &sample, now, actions),
                     Progress::Failed(failure) => self.fail(failure, now, actions),
@@ -471,16 +470,14 @@ impl Controller {
                     }
                 }
             }
-            State::Approaching { mut motion, answer, attempt, run_up } => {
-                match motion.observe(&sample, now) {
-                    Progress::UnderWay => self.state = State::Approaching { motion, answer, attempt, run_up },
-                    Progress::Arrived if run_up => self.approach_finally(answer, attempt, now, actions),
-                    Progress::Arrived => self.enter(State::Verifying { since: now, answer, attempt }, now),
-                    Progress::Failed(failure) => self.fail(failure, now, actions),
-                    Progress::Overdue => self.fail(Failure::TimedOut(Phase::Approaching), now, actions),
-                }
-            }
-            State::Restoring { mut motion, failure } => match motion.observe(&sample, now) {
+            State::Approaching { mut motion, answer, attempt, run_up } => match motion.observe(&sample) {
+                Progress::UnderWay => self.state = State::Approaching { motion, answer, attempt, run_up },
+                Progress::Arrived if run_up => self.approach_finally(answer, attempt, now, actions),
+                Progress::Arrived => self.enter(State::Verifying { since: now, answer, attempt }, now),
+                Progress::Failed(failure) => self.fail(failure, now, actions),
+                Progress::Overdue => self.fail(Failure::TimedOut(Phase::Approaching), now, actions),
+            },
+            State::Restoring { mut motion, failure } => match motion.observe(&sample) {
                 Progress::UnderWay => self.state = State::Restoring { motion, failure },
                 Progress::Arrived => self.finish(Outcome::Failed(failure), now, actions),
                 Progress::Failed(_) | Progress::Overdue => {

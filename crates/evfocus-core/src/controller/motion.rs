@@ -51,7 +51,9 @@ impl Motion {
         }
     }
 
-    pub(super) fn observe(&mut self, sample: &LensSample, now: HostMicros) -> Progress {
+    /// Judges by the time of the sample, not by when it was looked at: a host that was busy elsewhere is no fault of the lens.
+    pub(super) fn observe(&mut self, sample: &LensSample) -> Progress {
+        let now = sample.time();
         if sample.position.distance(self.last_change.1) > self.tolerance / 2.0 {
             self.last_change = (now, sample.position);
             self.moved |= sample.position.distance(self.from) > self.tolerance;
