@@ -106,7 +106,6 @@ impl Camera for SimCamera {
                 self.clock.sleep_until(stream.arrival().min(deadline));
             } else {
                 stream.deliver(batch);
-                batch.arrival = now;
                 return Ok(());
             }
         }

@@ -29,7 +29,10 @@ pub(super) struct Running {
     spikes: Vec<Spike>,
     /// Start of the step that comes next, microseconds since the rig was made.
     next_micros: i64,
+    /// When the transfer of the coming step arrives.
     arrival: HostMicros,
+    /// When the transfer of the last step arrived.
+    arrived: HostMicros,
     transfers: Xoshiro256PlusPlus,
     outbox: VecDeque<Event>,
     reached: CameraMicros,
@@ -62,6 +65,7 @@ impl Running {
             spikes: Vec::new(),
             next_micros: start_micros,
             arrival: epoch,
+            arrived: epoch + Duration::from_micros(start_micros.unsigned_abs()),
             transfers: Stream::Transfers.generator(config.seed),
             outbox: VecDeque::new(),
             reached: stamps.at(start_micros),
@@ -117,6 +121,7 @@ impl Running {
         }
         self.reached = self.stamps.at(end - 1);
         self.next_micros = end;
+        self.arrived = self.arrival;
         self.schedule();
     }
 
@@ -135,8 +140,10 @@ impl Running {
         self.arrival = self.arrival.max(sent + self.link.delay + Duration::from_secs_f64(jitter));
     }
 
-    /// Fills `batch` with what has arrived, as far as it has room.
+    /// Fills `batch` with what has arrived, as far as it has room. The arrival is the simulated link's: how long this
+    /// computer took to simulate the pixels is not part of the rig.
     pub(super) fn deliver(&mut self, batch: &mut EventBatch) {
+        batch.arrival = self.arrived;
         let count = self.outbox.len().min(batch.events.capacity());
         batch.events.extend(self.outbox.drain(..count));
         batch.lost = std::mem::take(&mut self.lost);
