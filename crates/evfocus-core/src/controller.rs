@@ -499,7 +499,6 @@ impl Controller {
             return;
         }
         if now.since(self.lens_heard) >= self.config.silence_timeout {
-            self.lens_ready = false;
             self.on_failure(Failure::LensSilent, now, actions);
             return;
         }

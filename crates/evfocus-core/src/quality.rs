@@ -44,10 +44,12 @@ impl SweepQuality {
         })
     }
 
-    /// The rate was capped by the read-out or the link: more than 30 % of the windows at the ceiling, or counts far more regular than
-    /// chance. The two rules hold on every saturated sweep tried and on no other (109 of them).
+    /// The rate was capped by the read-out or the link: more than 30 % of the windows at the ceiling, or counts far more
+    /// regular than chance. The two rules hold on every saturated sweep tried and on no other (109 of them). An even rate
+    /// that scatters as chance does is not held down by anything.
     pub fn is_saturated(&self) -> bool {
-        self.share_at_ceiling > 0.3 || self.regularity < 0.1
+        let is_chance = self.is_flat() && self.regularity > 0.5;
+        (self.share_at_ceiling > 0.3 && !is_chance) || self.regularity < 0.1
     }
 
     /// The rate does not depend on the lens: its variation is what chance alone makes.
