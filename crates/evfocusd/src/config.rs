@@ -154,8 +154,12 @@ impl std::fmt::Display for BadValue {
 }
 
 impl BadValue {
-    pub(crate) fn new(key: impl Into<String>, value: impl ToString, remedy: impl Into<String>) -> Self {
-        Self { key: key.into(), value: value.to_string(), remedy: remedy.into() }
+    pub(crate) fn new(
+        key: impl Into<String>,
+        value: impl std::fmt::Display,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self { key: key.into(), value: format!("{value}"), remedy: remedy.into() }
     }
 
     /// `value`, if it lies within `min` and `max`.

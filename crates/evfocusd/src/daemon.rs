@@ -28,6 +28,8 @@ use crate::threads::{NOTICES, StopFlag};
 
 /// Commands from clients that may wait for the control thread, which looks every 2 ms.
 const COMMANDS: usize = 64;
+/// How long the lens has for its first answer before the daemon is ready without it.
+const START_TIME: Duration = Duration::from_secs(2);
 /// How long the threads have to end; systemd gives 90 s.
 const STOP_TIME: Duration = Duration::from_secs(5);
 
@@ -47,9 +49,10 @@ pub async fn run(
     let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
     let devices = Devices::open(&config, &clock)?;
     let mut running = Running::start(&config, devices, &clock)?;
+    let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());
+    running.wait_for_the_lens().await;
     tracing::info!(socket = %config.socket.display(), state_dir = %config.state_dir.display(), "ready");
     ready();
-    let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());
     let handle = running.handle.clone();
     let threads_alive = running.ended.recv();
     let mut died = false;
@@ -178,6 +181,16 @@ impl Running {
             threads: vec![("control", control), ("camera", camera), ("lens", lens)],
             ended,
         })
+    }
+
+    /// Returns when the first word of the lens has been published, so that whoever is told "ready" can focus at once; or after a
+    /// while: a daemon without a lens still serves status.
+    async fn wait_for_the_lens(&self) {
+        let mut status = self.handle.status.clone();
+        let first_word = status.wait_for(|status| status.lens_position.is_some());
+        if tokio::time::timeout(START_TIME, first_word).await.is_err() {
+            tracing::warn!(waited = ?START_TIME, "the lens has not answered yet");
+        }
     }
 
     /// Stops the control thread, which stops the lens, and waits for all.

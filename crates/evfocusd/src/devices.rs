@@ -43,10 +43,12 @@ pub fn name(model: &str, serial: &str) -> String {
 
 /// What a failed operation means for the controller.
 pub fn failure(error: &DeviceError) -> DeviceFailure {
-    match error.kind {
-        DeviceErrorKind::Disconnected => DeviceFailure::Gone,
-        DeviceErrorKind::TimedOut => DeviceFailure::Silent,
-        _ => DeviceFailure::Fault,
+    if error.kind == DeviceErrorKind::Disconnected {
+        DeviceFailure::Gone
+    } else if error.kind == DeviceErrorKind::TimedOut {
+        DeviceFailure::Silent
+    } else {
+        DeviceFailure::Fault
     }
 }
 

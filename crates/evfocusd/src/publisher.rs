@@ -14,35 +14,35 @@ use crate::reports::ReportStore;
 use crate::wire;
 
 /// Messages of a run that a follower may be behind: a sweep of 20 s at 50 points a second.
-pub const PROGRESS: usize = 1_024;
+pub(crate) const PROGRESS: usize = 1_024;
 
 /// What stays the same while the daemon runs.
 #[derive(Debug, Clone)]
-pub struct Constants {
+pub(crate) struct Constants {
     /// The devices.
-    pub devices: ipc::RunDevices,
+    pub(crate) devices: ipc::RunDevices,
     /// Where the lens may go.
-    pub limits: LensRange,
+    pub(crate) limits: LensRange,
 }
 
 /// The task on the socket's side.
-pub struct Publisher {
+pub(crate) struct Publisher {
     /// From the control thread.
-    pub snapshots: watch::Receiver<Snapshot>,
+    pub(crate) snapshots: watch::Receiver<Snapshot>,
     /// From the control thread.
-    pub curve: Consumer<(RunId, CurvePoint)>,
+    pub(crate) curve: Consumer<(RunId, CurvePoint)>,
     /// From the control thread.
-    pub reports: mpsc::Receiver<Box<RunReport>>,
+    pub(crate) reports: mpsc::Receiver<Box<RunReport>>,
     /// To the clients.
-    pub status: watch::Sender<Arc<Status>>,
+    pub(crate) status: watch::Sender<Arc<Status>>,
     /// To the clients.
-    pub progress: broadcast::Sender<Arc<Progress>>,
+    pub(crate) progress: broadcast::Sender<Arc<Progress>>,
     /// To the disk.
-    pub store: Reports,
+    pub(crate) store: Reports,
     /// What stays the same.
-    pub constants: Constants,
+    pub(crate) constants: Constants,
     /// Host time.
-    pub clock: Arc<dyn Clock>,
+    pub(crate) clock: Arc<dyn Clock>,
 }
 
 impl std::fmt::Debug for Publisher {
@@ -51,26 +51,34 @@ impl std::fmt::Debug for Publisher {
     }
 }
 
+/// What the publisher remembers from one publication to the next.
+struct News {
+    fault: Option<String>,
+    last_run: Option<ipc::LastRun>,
+    run: Option<RunId>,
+    run_started_unix_s: f64,
+}
+
 /// The reports on disk, and the newest one in memory: a full disk must not swallow it.
 #[derive(Debug, Clone)]
-pub struct Reports {
+pub(crate) struct Reports {
     store: Result<ReportStore, ipc::Error>,
     newest: watch::Sender<Option<Arc<Report>>>,
 }
 
 impl Reports {
     /// Reports in `store`, or in memory only if that could not be opened.
-    pub fn new(store: Result<ReportStore, ipc::Error>) -> Self {
+    pub(crate) fn new(store: Result<ReportStore, ipc::Error>) -> Self {
         Self { store, newest: watch::Sender::new(None) }
     }
 
     /// What is wrong with the store.
-    pub fn fault(&self) -> Option<String> {
+    pub(crate) fn fault(&self) -> Option<String> {
         self.store.as_ref().err().map(ToString::to_string)
     }
 
     /// The number of the newest report on disk.
-    pub fn newest_on_disk(&self) -> Option<u64> {
+    pub(crate) fn newest_on_disk(&self) -> Option<u64> {
         self.store.as_ref().ok()?.newest()
     }
 
@@ -88,7 +96,7 @@ impl Reports {
     ///
     /// # Errors
     /// [`ipc::Error::NoSuchReport`] or [`ipc::Error::StorageFailed`].
-    pub fn read(&self, id: Option<u64>) -> Result<Report, ipc::Error> {
+    pub(crate) fn read(&self, id: Option<u64>) -> Result<Report, ipc::Error> {
         if let Some(newest) = self.newest.borrow().as_ref()
             && id.is_none_or(|id| id == newest.run_id)
         {
@@ -102,44 +110,59 @@ impl Reports {
 }
 
 impl Publisher {
-    /// Runs until the control thread is gone.
-    pub async fn run(mut self) {
-        let mut fault = self.store.fault();
-        let mut last_run = self.store.read(None).ok().map(|report| last_run(&report));
-        let mut run_started = 0.0;
-        let mut run_under_way = None;
+    /// Runs until the control thread is gone and its last report is written.
+    pub(crate) async fn run(mut self) {
+        let mut news = News {
+            fault: self.store.fault(),
+            last_run: self.store.read(None).ok().map(|report| last_run(&report)),
+            run: None,
+            run_started_unix_s: 0.0,
+        };
         loop {
             tokio::select! {
                 changed = self.snapshots.changed() => {
                     if changed.is_err() {
                         break;
                     }
-                    let snapshot = *self.snapshots.borrow_and_update();
-                    if snapshot.run != run_under_way {
-                        run_under_way = snapshot.run;
-                        run_started = unix_time().as_secs_f64();
-                    }
-                    let curve_points = self.send_curve(&snapshot);
-                    if let Some(run) = snapshot.run && !curve_points {
-                        self.send(progress(run, &snapshot, None));
-                    }
-                    let status = self.status(&snapshot, last_run.clone(), fault.clone());
-                    self.status.send_replace(Arc::new(status));
+                    self.publish_snapshot(&mut news);
                 }
-                Some(run) = self.reports.recv() => {
-                    let snapshot = *self.snapshots.borrow();
-                    self.send_curve(&snapshot);
-                    let circumstances = wire::Circumstances { started_unix_s: run_started, devices: self.constants.devices.clone() };
-                    let report = Arc::new(wire::report(&run, circumstances));
-                    log(&report);
-                    fault = keep(self.store.clone(), Arc::clone(&report)).await;
-                    last_run = Some(self::last_run(&report));
-                    let status = self.status(&snapshot, last_run.clone(), fault.clone());
-                    self.status.send_replace(Arc::new(status));
-                    self.send(Progress { done: true, report: Some(Report::clone(&report)), ..progress(run.id, &snapshot, None) });
-                }
+                Some(run) = self.reports.recv() => self.publish_report(&run, &mut news).await,
             }
         }
+        while let Some(run) = self.reports.recv().await {
+            self.publish_report(&run, &mut news).await;
+        }
+    }
+
+    fn publish_snapshot(&mut self, news: &mut News) {
+        let snapshot = *self.snapshots.borrow_and_update();
+        if snapshot.run != news.run {
+            news.run = snapshot.run;
+            news.run_started_unix_s = unix_time().as_secs_f64();
+        }
+        let curve_points = self.send_curve(&snapshot);
+        if let Some(run) = snapshot.run
+            && !curve_points
+        {
+            self.send(progress(run, &snapshot, None));
+        }
+        self.status.send_replace(Arc::new(self.status(&snapshot, news)));
+    }
+
+    async fn publish_report(&mut self, run: &RunReport, news: &mut News) {
+        let snapshot = *self.snapshots.borrow();
+        self.send_curve(&snapshot);
+        let circumstances = wire::Circumstances {
+            started_unix_s: news.run_started_unix_s,
+            devices: self.constants.devices.clone(),
+        };
+        let report = Arc::new(wire::report(run, circumstances));
+        log(&report);
+        news.fault = keep(self.store.clone(), Arc::clone(&report)).await;
+        news.last_run = Some(last_run(&report));
+        self.status.send_replace(Arc::new(self.status(&snapshot, news)));
+        let report = Some(Report::clone(&report));
+        self.send(Progress { done: true, report, ..progress(run.id, &snapshot, None) });
     }
 
     /// Sends the points of the live curve that have come; whether there were any.
@@ -158,7 +181,7 @@ impl Publisher {
         tracing::trace!(listeners, "progress");
     }
 
-    fn status(&self, snapshot: &Snapshot, last_run: Option<ipc::LastRun>, fault: Option<String>) -> Status {
+    fn status(&self, snapshot: &Snapshot, news: &News) -> Status {
         let device = |ready: bool, name: &str| ready.then(|| name.to_owned());
         let missing = match (snapshot.camera_ready, snapshot.lens_ready) {
             (true, true) => None,
@@ -180,10 +203,10 @@ impl Publisher {
             lens_range: Some(wire::lens_range(self.constants.limits)),
             event_rate: snapshot.event_rate.0,
             events_lost: snapshot.lost,
-            last_run,
+            last_run: news.last_run.clone(),
             camera: device(snapshot.camera_ready, &self.constants.devices.camera),
             lens: device(snapshot.lens_ready, &self.constants.devices.lens),
-            fault: missing.or(fault),
+            fault: missing.or_else(|| news.fault.clone()),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: Duration::from_micros(u64::try_from(self.clock.now().0).unwrap_or(0)).as_secs_f64(),
         }

@@ -11,7 +11,7 @@ const SUFFIX: &str = ".json";
 
 /// Where reports are kept.
 #[derive(Debug, Clone)]
-pub struct ReportStore {
+pub(crate) struct ReportStore {
     directory: PathBuf,
     kept: usize,
 }
@@ -21,7 +21,7 @@ impl ReportStore {
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the directory and the remedy.
-    pub fn open(state_dir: &Path, kept: usize) -> Result<Self, Error> {
+    pub(crate) fn open(state_dir: &Path, kept: usize) -> Result<Self, Error> {
         let store = Self { directory: state_dir.join("reports"), kept: kept.max(1) };
         fs::create_dir_all(&store.directory).map_err(|error| failed(&store.directory, &error))?;
         Ok(store)
@@ -36,7 +36,7 @@ impl ReportStore {
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the file; what was there before stays.
-    pub fn write(&self, report: &Report) -> Result<PathBuf, Error> {
+    pub(crate) fn write(&self, report: &Report) -> Result<PathBuf, Error> {
         let path = self.path(report.run_id);
         let temporary = path.with_extension("json.new");
         let written = self.write_through(report, &temporary, &path);
@@ -64,7 +64,7 @@ impl ReportStore {
     ///
     /// # Errors
     /// [`Error::NoSuchReport`], or [`Error::StorageFailed`] if it is there and cannot be read.
-    pub fn read(&self, id: Option<u64>) -> Result<Report, Error> {
+    pub(crate) fn read(&self, id: Option<u64>) -> Result<Report, Error> {
         let Some(wanted) = id.or_else(|| self.newest()) else {
             return Err(Error::NoSuchReport { id });
         };
@@ -81,7 +81,7 @@ impl ReportStore {
     }
 
     /// The number of the newest report.
-    pub fn newest(&self) -> Option<u64> {
+    pub(crate) fn newest(&self) -> Option<u64> {
         self.numbers().into_iter().max()
     }
 
@@ -108,12 +108,16 @@ impl ReportStore {
 }
 
 fn failed(path: &Path, error: &io::Error) -> Error {
-    let remedy = match error.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on that disk",
-        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-            "let the daemon's user write there, or name another directory with --state-dir"
-        }
-        _ => "check the directory, or name another one with --state-dir",
+    const FULL: [io::ErrorKind; 3] =
+        [io::ErrorKind::StorageFull, io::ErrorKind::QuotaExceeded, io::ErrorKind::FileTooLarge];
+    const FORBIDDEN: [io::ErrorKind; 2] =
+        [io::ErrorKind::PermissionDenied, io::ErrorKind::ReadOnlyFilesystem];
+    let remedy = if FULL.contains(&error.kind()) {
+        "make room on that disk"
+    } else if FORBIDDEN.contains(&error.kind()) {
+        "let the daemon's user write there, or name another directory with --state-dir"
+    } else {
+        "check the directory, or name another one with --state-dir"
     };
     Error::StorageFailed { path: path.display().to_string(), message: format!("{error}; {remedy}") }
 }

@@ -8,9 +8,9 @@
 //!
 //! Every queue is bounded. The lens is stopped when its orders end, whatever ended them: a clean stop, an error, a panic.
 
-pub mod camera;
-pub mod control;
-pub mod lens;
+pub(crate) mod camera;
+pub(crate) mod control;
+pub(crate) mod lens;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,23 +19,23 @@ use evfocus_core::controller::DeviceFailure;
 
 /// Tells the threads to stop.
 #[derive(Debug, Clone, Default)]
-pub struct StopFlag(Arc<AtomicBool>);
+pub(crate) struct StopFlag(Arc<AtomicBool>);
 
 impl StopFlag {
     /// Tells them.
-    pub fn stop(&self) {
+    pub(crate) fn stop(&self) {
         self.0.store(true, Ordering::SeqCst);
     }
 
     /// Whether they have been told.
-    pub fn is_stopped(&self) -> bool {
+    pub(crate) fn is_stopped(&self) -> bool {
         self.0.load(Ordering::SeqCst)
     }
 }
 
 /// News of a device's health, from its thread to the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Notice {
+pub(crate) enum Notice {
     /// The camera failed.
     CameraFailed(DeviceFailure),
     /// The camera streams again.
@@ -47,4 +47,4 @@ pub enum Notice {
 }
 
 /// Room for notices: devices change their health a few times a minute at the worst.
-pub const NOTICES: usize = 64;
+pub(crate) const NOTICES: usize = 64;

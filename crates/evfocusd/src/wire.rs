@@ -10,7 +10,7 @@ use evfocus_core::{
 use evfocus_ipc as ipc;
 
 /// The request that a client means.
-pub fn focus_request(request: &ipc::FocusRequest) -> Result<FocusRequest, ipc::Error> {
+pub(crate) fn focus_request(request: &ipc::FocusRequest) -> Result<FocusRequest, ipc::Error> {
     let invalid = |name: &str, value: String, remedy: String| ipc::Error::InvalidArgument {
         name: name.to_owned(),
         value,
@@ -59,7 +59,7 @@ pub fn focus_request(request: &ipc::FocusRequest) -> Result<FocusRequest, ipc::E
 }
 
 /// A refused command as a typed error.
-pub fn refusal(refusal: &Refusal) -> ipc::Error {
+pub(crate) fn refusal(refusal: &Refusal) -> ipc::Error {
     match *refusal {
         Refusal::Busy { run } => ipc::Error::Busy { run_id: run.0 },
         Refusal::ManualMode => ipc::Error::WrongMode { mode: ipc::Mode::Manual, needed: ipc::Mode::Auto },
@@ -91,7 +91,7 @@ pub fn refusal(refusal: &Refusal) -> ipc::Error {
 }
 
 /// The core's mode.
-pub fn core_mode(mode: ipc::Mode) -> Mode {
+pub(crate) fn core_mode(mode: ipc::Mode) -> Mode {
     match mode {
         ipc::Mode::Manual => Mode::Manual,
         ipc::Mode::Auto => Mode::Auto,
@@ -99,7 +99,7 @@ pub fn core_mode(mode: ipc::Mode) -> Mode {
 }
 
 /// The socket's mode.
-pub fn mode(mode: Mode) -> ipc::Mode {
+pub(crate) fn mode(mode: Mode) -> ipc::Mode {
     match mode {
         Mode::Manual => ipc::Mode::Manual,
         Mode::Auto => ipc::Mode::Auto,
@@ -107,7 +107,7 @@ pub fn mode(mode: Mode) -> ipc::Mode {
 }
 
 /// The socket's state.
-pub fn state(state: FocusState) -> ipc::State {
+pub(crate) fn state(state: FocusState) -> ipc::State {
     match state {
         FocusState::Idle => ipc::State::Idle,
         FocusState::Scanning => ipc::State::Scanning,
@@ -117,7 +117,7 @@ pub fn state(state: FocusState) -> ipc::State {
 }
 
 /// The socket's phase.
-pub fn phase(phase: Option<Phase>) -> ipc::Phase {
+pub(crate) fn phase(phase: Option<Phase>) -> ipc::Phase {
     match phase {
         None => ipc::Phase::None,
         Some(Phase::Homing) => ipc::Phase::Homing,
@@ -133,7 +133,7 @@ pub fn phase(phase: Option<Phase>) -> ipc::Phase {
 }
 
 /// The positions of `range`.
-pub fn lens_range(range: LensRange) -> ipc::LensRange {
+pub(crate) fn lens_range(range: LensRange) -> ipc::LensRange {
     ipc::LensRange { min: range.min().0, max: range.max().0 }
 }
 
@@ -155,15 +155,15 @@ fn plan(plan: &FocusPlan) -> ipc::FocusRequest {
 
 /// Who and when, which a run's record does not know.
 #[derive(Debug, Clone)]
-pub struct Circumstances {
+pub(crate) struct Circumstances {
     /// Seconds since 1970 at the start of the run.
-    pub started_unix_s: f64,
+    pub(crate) started_unix_s: f64,
     /// The devices.
-    pub devices: ipc::RunDevices,
+    pub(crate) devices: ipc::RunDevices,
 }
 
 /// The record of a run as the socket and the report file show it.
-pub fn report(run: &RunReport, circumstances: Circumstances) -> ipc::Report {
+pub(crate) fn report(run: &RunReport, circumstances: Circumstances) -> ipc::Report {
     let sum = |count: fn(&LegReport) -> u64| run.sweeps().map(count).sum::<u64>();
     let (on, off) = (sum(|leg| leg.on), sum(|leg| leg.off));
     ipc::Report {
@@ -207,11 +207,10 @@ fn outcome(run: &RunReport) -> ipc::Outcome {
             (ipc::State::Focused, None, format!("focused at {position}"), Some(position.0))
         }
         Outcome::Failed(failure) => {
-            let position = match failure {
-                Failure::PeakAtEdge { position } => Some(position.0),
-                _ => None,
-            };
-            (ipc::State::Failed, Some(failure.name().to_owned()), failure.to_string(), position)
+            // An answer at the edge of the range tells the caller where to look.
+            let at_edge =
+                if let Failure::PeakAtEdge { position } = failure { Some(position.0) } else { None };
+            (ipc::State::Failed, Some(failure.name().to_owned()), failure.to_string(), at_edge)
         }
         Outcome::Aborted => (
             ipc::State::Idle,

@@ -12,30 +12,30 @@ use super::{Notice, StopFlag};
 use crate::devices;
 
 /// Batches in flight: 64 transfers of a millisecond each is what the control thread may fall behind without loss.
-pub const BATCHES: usize = 64;
+pub(crate) const BATCHES: usize = 64;
 /// Events a batch holds: 1 ms at 65 million events a second.
-pub const BATCH_EVENTS: usize = 65_536;
+pub(crate) const BATCH_EVENTS: usize = 65_536;
 /// How long one read may wait, so that a stop is noticed.
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
 /// How often a camera that failed is tried again.
 const RETRY: Duration = Duration::from_secs(1);
 
 /// The thread's ends of its queues.
-pub struct CameraThread {
+pub(crate) struct CameraThread {
     /// The camera; its stream has not been started.
-    pub camera: Box<dyn Camera>,
+    pub(crate) camera: Box<dyn Camera>,
     /// Host time.
-    pub clock: Arc<dyn Clock>,
+    pub(crate) clock: Arc<dyn Clock>,
     /// Empty batches come back here.
-    pub empty: Consumer<EventBatch>,
+    pub(crate) empty: Consumer<EventBatch>,
     /// Filled batches leave here.
-    pub filled: Producer<EventBatch>,
+    pub(crate) filled: Producer<EventBatch>,
     /// Health leaves here.
-    pub notices: Producer<Notice>,
+    pub(crate) notices: Producer<Notice>,
     /// Who is woken when something leaves.
-    pub control: Thread,
+    pub(crate) control: Thread,
     /// When to end.
-    pub stop: StopFlag,
+    pub(crate) stop: StopFlag,
 }
 
 impl std::fmt::Debug for CameraThread {
@@ -46,7 +46,7 @@ impl std::fmt::Debug for CameraThread {
 
 impl CameraThread {
     /// Runs until stopped.
-    pub fn run(mut self) {
+    pub(crate) fn run(mut self) {
         // With every batch on its way, events are read into this one and counted as lost.
         let mut spare = EventBatch::with_capacity(BATCH_EVENTS);
         let mut lost = 0;

@@ -21,43 +21,43 @@ const PUBLISH: Duration = Duration::from_millis(20);
 /// Actions one input can bring about, with room to spare.
 const ACTIONS: usize = 16;
 /// Curve points on their way to the followers.
-pub const CURVE_POINTS: usize = 4_096;
+pub(crate) const CURVE_POINTS: usize = 4_096;
 /// Reports on their way to the disk.
-pub const REPORTS: usize = 16;
+pub(crate) const REPORTS: usize = 16;
 
 /// What leaves the control thread for the socket's side.
 #[derive(Debug)]
-pub struct Publications {
+pub(crate) struct Publications {
     /// The state, a few dozen times a second.
-    pub snapshots: watch::Sender<Snapshot>,
+    pub(crate) snapshots: watch::Sender<Snapshot>,
     /// The live curve.
-    pub curve: Producer<(RunId, CurvePoint)>,
+    pub(crate) curve: Producer<(RunId, CurvePoint)>,
     /// The record of each run.
-    pub reports: mpsc::Sender<Box<RunReport>>,
+    pub(crate) reports: mpsc::Sender<Box<RunReport>>,
 }
 
 /// The thread's ends of its queues.
-pub struct ControlThread {
+pub(crate) struct ControlThread {
     /// The state machine.
-    pub controller: Controller,
+    pub(crate) controller: Controller,
     /// Host time.
-    pub clock: Arc<dyn Clock>,
+    pub(crate) clock: Arc<dyn Clock>,
     /// Filled batches come here.
-    pub filled: Consumer<EventBatch>,
+    pub(crate) filled: Consumer<EventBatch>,
     /// Empty batches go back.
-    pub empty: Producer<EventBatch>,
+    pub(crate) empty: Producer<EventBatch>,
     /// The lens's answers come here.
-    pub samples: Consumer<LensSample>,
+    pub(crate) samples: Consumer<LensSample>,
     /// Health of camera and lens.
-    pub notices: [Consumer<Notice>; 2],
+    pub(crate) notices: [Consumer<Notice>; 2],
     /// Commands from the socket.
-    pub commands: mpsc::Receiver<Command>,
+    pub(crate) commands: mpsc::Receiver<Command>,
     /// Orders to the lens.
-    pub orders: SyncSender<Action>,
+    pub(crate) orders: SyncSender<Action>,
     /// To the socket's side.
-    pub publications: Publications,
+    pub(crate) publications: Publications,
     /// When to end.
-    pub stop: StopFlag,
+    pub(crate) stop: StopFlag,
 }
 
 impl std::fmt::Debug for ControlThread {
@@ -68,7 +68,7 @@ impl std::fmt::Debug for ControlThread {
 
 impl ControlThread {
     /// Runs until stopped; a run under way is aborted then. Dropping the orders' queue stops the lens.
-    pub fn run(mut self) {
+    pub(crate) fn run(mut self) {
         let mut actions = Vec::with_capacity(ACTIONS);
         let mut published = (HostMicros(i64::MIN), self.controller.snapshot());
         let mut curve_sent = (RunId(0), 0);

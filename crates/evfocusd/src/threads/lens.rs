@@ -14,9 +14,9 @@ use super::Notice;
 use crate::devices;
 
 /// Orders in flight; the controller gives two at a time and waits for their effect.
-pub const ORDERS: usize = 16;
+pub(crate) const ORDERS: usize = 16;
 /// Samples in flight: half a second at 1 kHz.
-pub const SAMPLES: usize = 512;
+pub(crate) const SAMPLES: usize = 512;
 /// A lens at rest is asked this seldom.
 const REST_POLL: Duration = Duration::from_millis(50);
 /// How long a lens is asked often after the last order or motion.
@@ -25,21 +25,21 @@ const ATTENTION: Duration = Duration::from_millis(500);
 const RETRY: Duration = Duration::from_secs(1);
 
 /// The thread's ends of its queues.
-pub struct LensThread {
+pub(crate) struct LensThread {
     /// The lens.
-    pub lens: Box<dyn Lens>,
+    pub(crate) lens: Box<dyn Lens>,
     /// Host time.
-    pub clock: Arc<dyn Clock>,
+    pub(crate) clock: Arc<dyn Clock>,
     /// How often a moving lens is asked where it is.
-    pub poll: Duration,
+    pub(crate) poll: Duration,
     /// Orders come here; their end is the end of the thread.
-    pub orders: Receiver<Action>,
+    pub(crate) orders: Receiver<Action>,
     /// Answers leave here.
-    pub samples: Producer<LensSample>,
+    pub(crate) samples: Producer<LensSample>,
     /// Health leaves here.
-    pub notices: Producer<Notice>,
+    pub(crate) notices: Producer<Notice>,
     /// Who is woken when something leaves.
-    pub control: Thread,
+    pub(crate) control: Thread,
 }
 
 impl std::fmt::Debug for LensThread {
@@ -50,7 +50,7 @@ impl std::fmt::Debug for LensThread {
 
 impl LensThread {
     /// Runs until there can be no more orders, then stops the lens.
-    pub fn run(mut self) {
+    pub(crate) fn run(mut self) {
         let mut failed = false;
         let mut next_poll = self.clock.now();
         let mut attentive_until = next_poll;

@@ -1,0 +1,248 @@
+//! The daemon as a process: how it starts, what keeps it from starting, and how it ends.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStderr, Command, ExitStatus, Output, Stdio};
+
+use anyhow::{Context, Result, bail};
+use evfocus_ipc::client::Client;
+use evfocus_ipc::{FocusRequest, LensRange, Phase, Report, State};
+use tempfile::TempDir;
+
+const EVFOCUSD: &str = env!("CARGO_BIN_EXE_evfocusd");
+
+/// A daemon with the simulated rig in a folder of its own.
+struct Daemon {
+    child: Child,
+    log: BufReader<ChildStderr>,
+    folder: Option<TempDir>,
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        // It has ended already in the tests that pass; one that fails must not leave it behind.
+        self.child.kill().unwrap_or_default();
+        self.child.wait().map(drop).unwrap_or_default();
+    }
+}
+
+impl Daemon {
+    fn start() -> Result<Self> {
+        Self::start_in(tempfile::tempdir()?)
+    }
+
+    /// Returns once the daemon says that it is ready.
+    fn start_in(folder: TempDir) -> Result<Self> {
+        let mut child = Command::new(EVFOCUSD)
+            .args(["--socket".as_ref(), folder.path().join("socket").as_os_str()])
+            .args(["--state-dir".as_ref(), folder.path().join("state").as_os_str()])
+            .env_remove("JOURNAL_STREAM")
+            .env_remove("EVFOCUS_LOG")
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()?;
+        let mut log = BufReader::new(child.stderr.take().context("standard error")?);
+        let mut seen = String::new();
+        while !seen.contains(" ready ") {
+            if log.read_line(&mut seen)? == 0 {
+                bail!("not ready: {seen}");
+            }
+        }
+        Ok(Self { child, log, folder: Some(folder) })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.as_ref().map(|folder| folder.path().join(name)).unwrap_or_default()
+    }
+
+    fn socket(&self) -> PathBuf {
+        self.path("socket")
+    }
+
+    fn reports(&self) -> PathBuf {
+        self.path("state/reports")
+    }
+
+    /// Sends a signal and returns how the daemon ended, and the rest of its log.
+    fn end(mut self, signal: &str) -> Result<(ExitStatus, String, TempDir)> {
+        let sent = Command::new("kill").arg(signal).arg(self.child.id().to_string()).status()?;
+        assert!(sent.success());
+        let mut rest = String::new();
+        self.log.read_to_string(&mut rest)?;
+        Ok((self.child.wait()?, rest, self.folder.take().context("a folder")?))
+    }
+}
+
+/// A short sweep: the simulated rig runs in real time here.
+fn short() -> FocusRequest {
+    FocusRequest {
+        range: Some(LensRange { min: 1600.0, max: 2400.0 }),
+        directions: Some("forward".to_owned()),
+        ..FocusRequest::default()
+    }
+}
+
+fn block_on<T>(future: impl Future<Output = Result<T>>) -> Result<T> {
+    tokio::runtime::Builder::new_current_thread().enable_all().build()?.block_on(future)
+}
+
+async fn follow_to(socket: &Path, request: &FocusRequest, phase: Phase) -> Result<()> {
+    let mut progress = Client::connect(socket).await?.focus(request).await?;
+    while let Some(news) = progress.next().await? {
+        if news.phase == phase {
+            return Ok(());
+        }
+    }
+    bail!("the run ended without {phase}")
+}
+
+fn run(arguments: &[&str]) -> Result<Output> {
+    Ok(Command::new(EVFOCUSD).args(arguments).env_remove("JOURNAL_STREAM").output()?)
+}
+
+/// The daemon does not start, and its last line holds all of `words`.
+fn refuses(arguments: &[&str], words: &[&str]) -> Result<()> {
+    let output = run(arguments)?;
+    let error = String::from_utf8(output.stderr)?;
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    let last = error.lines().last().unwrap_or_default();
+    for word in words {
+        assert!(last.contains(word), "{word:?} is not in {last:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_run_over_the_socket_ends_in_focus_and_in_a_file() -> Result<()> {
+    let daemon = Daemon::start()?;
+    let (report, status) = block_on(async {
+        let report = Client::connect(&daemon.socket()).await?.focus_and_wait(&short()).await?;
+        Ok((report, Client::connect(&daemon.socket()).await?.status().await?))
+    })?;
+    assert_eq!(report.result.state, State::Focused, "{}", report.result.message);
+    assert_eq!(status.state, State::Focused);
+    assert_eq!(status.last_run.context("a last run")?.id, report.run_id);
+    let file: Report = serde_json::from_slice(&fs::read(daemon.reports().join("run-00000001.json"))?)?;
+    assert_eq!(file, report);
+    let (exit, log, _) = daemon.end("-TERM")?;
+    assert!(exit.success(), "{log}");
+    Ok(())
+}
+
+#[test]
+fn numbers_of_runs_go_on_after_a_restart() -> Result<()> {
+    let daemon = Daemon::start()?;
+    let first =
+        block_on(async { Ok(Client::connect(&daemon.socket()).await?.focus_and_wait(&short()).await?) })?;
+    let (_, _, folder) = daemon.end("-TERM")?;
+    let daemon = Daemon::start_in(folder)?;
+    let (kept, second) = block_on(async {
+        let kept = Client::connect(&daemon.socket()).await?.report(None).await?;
+        Ok((kept, Client::connect(&daemon.socket()).await?.focus_and_wait(&short()).await?))
+    })?;
+    assert_eq!(kept, first);
+    assert_eq!(second.run_id, first.run_id + 1);
+    Ok(())
+}
+
+#[test]
+fn a_signal_in_mid_sweep_stops_the_lens_and_leaves_a_report() -> Result<()> {
+    for signal in ["-TERM", "-INT"] {
+        let daemon = Daemon::start()?;
+        block_on(follow_to(&daemon.socket(), &FocusRequest::default(), Phase::Sweeping))?;
+        let (socket, report) = (daemon.socket(), daemon.reports().join("run-00000001.json"));
+        let (exit, log, folder) = daemon.end(signal)?;
+        assert!(exit.success(), "{signal}: {log}");
+        assert!(log.contains("the lens is stopped"), "{log}");
+        assert!(!socket.exists());
+        let report: Report = serde_json::from_slice(&fs::read(report)?)?;
+        assert_eq!(report.result.reason.as_deref(), Some("aborted"));
+        drop(folder);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_full_disk_costs_neither_the_run_nor_the_daemon() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let reports = folder.path().join("state/reports");
+    fs::create_dir_all(&reports)?;
+    // Every write to this device fails for want of room.
+    symlink("/dev/full", reports.join("run-00000001.json.new"))?;
+    let daemon = Daemon::start_in(folder)?;
+    block_on(async {
+        let report = Client::connect(&daemon.socket()).await?.focus_and_wait(&short()).await?;
+        assert_eq!(report.result.state, State::Focused);
+        let mut client = Client::connect(&daemon.socket()).await?;
+        let fault = client.status().await?.fault.context("a fault")?;
+        assert!(fault.contains("run-00000001.json") && fault.contains("make room"), "{fault}");
+        assert_eq!(client.report(Some(1)).await?, report, "from memory");
+        let second = Client::connect(&daemon.socket()).await?.focus_and_wait(&short()).await?;
+        assert_eq!((second.run_id, client.status().await?.fault), (2, None), "the next one finds room");
+        Ok(())
+    })?;
+    assert!(!daemon.reports().join("run-00000001.json").exists(), "half a report");
+    Ok(())
+}
+
+#[test]
+fn a_state_directory_that_cannot_be_made_costs_only_the_files() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    fs::write(folder.path().join("state"), "a file")?;
+    let daemon = Daemon::start_in(folder)?;
+    block_on(async {
+        let fault = Client::connect(&daemon.socket()).await?.status().await?.fault.context("a fault")?;
+        assert!(fault.contains("state") && fault.contains("--state-dir"), "{fault}");
+        let report = Client::connect(&daemon.socket()).await?.focus_and_wait(&short()).await?;
+        assert_eq!(report.result.state, State::Focused);
+        Ok(())
+    })
+}
+
+#[test]
+fn a_socket_in_use_is_refused_and_its_owner_lives() -> Result<()> {
+    let daemon = Daemon::start()?;
+    let socket = daemon.socket();
+    refuses(&["--socket", &socket.to_string_lossy()], &[&socket.to_string_lossy(), "running"])?;
+    block_on(async { Ok(Client::connect(&daemon.socket()).await?.status().await?) })?;
+    Ok(())
+}
+
+#[test]
+fn a_socket_that_a_killed_daemon_left_is_taken_over() -> Result<()> {
+    let daemon = Daemon::start()?;
+    let (exit, _, folder) = daemon.end("-KILL")?;
+    assert!(!exit.success());
+    assert!(folder.path().join("socket").exists());
+    let daemon = Daemon::start_in(folder)?;
+    block_on(async { Ok(Client::connect(&daemon.socket()).await?.status().await?) })?;
+    Ok(())
+}
+
+#[test]
+fn what_keeps_it_from_starting_is_said() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    fs::write(path("bad.toml"), "[focus]\nmethod = \"esg\"\n")?;
+    fs::write(path("unknown.toml"), "[fokus]\n")?;
+    fs::write(path("good.toml"), "[focus]\nmethod = \"er-fixed\"\n")?;
+    fs::write(path("file"), "")?;
+    refuses(&["--config", &path("bad.toml")], &["bad.toml", "focus.method", "esg", "er-fixed"])?;
+    refuses(&["check-config", &path("bad.toml")], &["bad.toml", "focus.method", "esg", "er-fixed"])?;
+    let unknown = run(&["check-config", &path("unknown.toml")])?;
+    let unknown = String::from_utf8(unknown.stderr)?;
+    assert!(
+        unknown.contains("unknown.toml") && unknown.contains("fokus") && unknown.contains("line 1"),
+        "{unknown}"
+    );
+    refuses(&["--config", &path("none.toml")], &["none.toml", "No such file"])?;
+    refuses(&["--socket", &path("file")], &["file"])?;
+    refuses(&["--socket", "/proc/evfocus/socket"], &["/proc/evfocus"])?;
+    let good = run(&["check-config", &path("good.toml")])?;
+    assert!(good.status.success());
+    assert!(String::from_utf8(good.stdout)?.contains("good"));
+    assert_eq!(run(&["--sokcet", "x"])?.status.code(), Some(2), "wrong usage");
+    Ok(())
+}
