@@ -1,0 +1,82 @@
+//! The configuration: the files that come with evfocus are good, and what is wrong with others is said.
+
+use std::path::{Path, PathBuf};
+
+use evfocusd::Config;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config")
+}
+
+#[test]
+fn every_file_that_comes_with_evfocus_is_good() {
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            Config::read(&path).unwrap();
+            files += 1;
+        }
+    }
+    assert!(files > 0);
+}
+
+#[test]
+fn the_annotated_file_says_what_no_file_means() {
+    let annotated = Config::read(&folder().join("evfocusd.toml")).unwrap();
+    let nothing = Config::simulated().unwrap();
+    assert_eq!(format!("{annotated:?}"), format!("{nothing:?}"));
+}
+
+#[test]
+fn the_optional_keys_are_annotated_with_what_is_used_without_them() {
+    let text = std::fs::read_to_string(folder().join("evfocusd.toml")).unwrap();
+    let (_, after) = text.split_once("[focus]").unwrap();
+    let (section, _) = after.split_once("# The rig that").unwrap();
+    let keys: Vec<_> = section.lines().map(|line| line.trim_start_matches("# ")).collect();
+    let written = Config::parse(&format!("[focus]\n{}", keys.join("\n")), Path::new("annotated")).unwrap();
+    let nothing = Config::simulated().unwrap();
+    let rig = |config: &Config| evfocusd::VirtualRig::new(config).unwrap().controller().config().clone();
+    let (mut written, nothing) = (rig(&written), rig(&nothing));
+    assert!((written.approach_margin - nothing.approach_margin).abs() < 1e-9, "a decimal and a product");
+    written.approach_margin = nothing.approach_margin;
+    assert_eq!(written, nothing);
+}
+
+/// What a mistake is answered with must name the file and everything in `words`.
+fn refused(text: &str, words: &[&str]) {
+    let parsed = Config::parse(text, Path::new("/etc/evfocus/rig.toml"));
+    let error = parsed.err().map(|error| error.to_string()).unwrap_or_default();
+    for word in ["/etc/evfocus/rig.toml"].iter().chain(words) {
+        assert!(error.contains(word), "{word:?} is not in {error:?}");
+    }
+}
+
+#[test]
+fn mistakes_are_named_with_key_value_and_remedy() {
+    refused("[focus]\nmethud = \"egs\"", &["methud", "line 2"]);
+    refused("[focus]\nmethod = \"esg\"", &["focus.method", "esg", "er-fixed"]);
+    refused("[focus]\nrest_ms = \"100 ms\"", &["rest_ms", "line 2"]);
+    refused("[focus]\nrest_ms = 5", &["focus.rest_ms", "5", "10"]);
+    refused("[focus]\nrest_ms = nan", &["focus.rest_ms", "NaN"]);
+    refused("[focus]\nsweep_speed_counts_per_s = 9000", &["sweep_speed_counts_per_s", "9000", "1765"]);
+    refused("[focus]\ndirections = \"backward\"", &["focus.directions", "backward", "both"]);
+    refused("[lens]\nbackend = \"moonlite\"", &["lens.backend", "moonlite", "simulated"]);
+    refused("[lens]\nmin_counts = 3000\nmax_counts = 300", &["lens.min_counts", "3000", "300"]);
+    refused("[lens]\nmax_counts = 9999", &["lens.max_counts", "9999", "3750"]);
+    refused("[simulation]\nscene = \"cat\"", &["simulation.scene", "cat", "dead-leaves"]);
+    refused("[simulation]\nlight = \"dim\"", &["simulation.light", "dim", "dark"]);
+    refused("[simulation]\nfocus_counts = 99999", &["focus", "99999", "3750"]);
+    refused("[[simulation.faults]]\nkind = \"gremlin\"\nafter_ms = 1", &["gremlin", "lens-stalled"]);
+    refused("[[simulation.faults]]\nkind = \"lens-stalled\"", &["lens-stalled", "after_ms"]);
+    refused("[daemon]\nmode = \"continuous\"", &["daemon.mode", "continuous", "manual"]);
+    refused("[daemon]\nreports_kept = 0", &["daemon.reports_kept", "0", "1"]);
+    refused("[daemon\n", &["line 1"]);
+    refused("[serial]\nport = 1", &["serial"]);
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_named() {
+    let error = Config::read(Path::new("/nonexistent/evfocus.toml")).unwrap_err().to_string();
+    assert!(error.contains("/nonexistent/evfocus.toml"), "{error}");
+}

@@ -1,0 +1,202 @@
+//! The whole focus loop on the simulated rig, in virtual time: what it finds, and what it says when it cannot.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use evfocus_core::controller::{Command, FocusRequest, FocusState, Mode, Refusal};
+use evfocus_core::{Directions, LensPosition, LensSpeed, Method, Outcome, Phase, RunReport};
+use evfocusd::{Config, VirtualRig, VirtualRigError};
+use hil_sim::{Fault, FaultKind, FaultTrigger, Flicker};
+
+fn config(text: &str) -> Result<Config> {
+    Ok(Config::parse(text, Path::new("(in the test)"))?)
+}
+
+fn run(config: &Config) -> Result<(VirtualRig, RunReport)> {
+    let mut rig = VirtualRig::new(config)?;
+    let report = rig.focus(FocusRequest::default(), |_, _, _| {})?;
+    Ok((rig, report))
+}
+
+fn error_of(rig: &VirtualRig, report: &RunReport) -> Result<f64> {
+    let truth = rig.truth();
+    let truth = truth.first().context("a truth")?;
+    match report.outcome {
+        Outcome::Focused { position } => Ok(position.counts_from(*truth)),
+        Outcome::Failed(_) | Outcome::Aborted => anyhow::bail!("not focused: {:?}", report.outcome),
+    }
+}
+
+fn reason_of(report: &RunReport) -> &'static str {
+    match report.outcome {
+        Outcome::Failed(failure) => failure.name(),
+        Outcome::Focused { .. } => "focused",
+        Outcome::Aborted => "aborted",
+    }
+}
+
+fn fault(kind: FaultKind, trigger: FaultTrigger) -> Result<Config> {
+    let mut config = config("")?;
+    config.rig.faults = vec![Fault { kind, trigger }];
+    Ok(config)
+}
+
+const MIDWAY: FaultTrigger = FaultTrigger::AtPosition(LensPosition(1500.0));
+
+#[test]
+fn a_still_scene_is_focused_and_the_lens_stands_there() -> Result<()> {
+    let (rig, report) = run(&config("")?)?;
+    let error = error_of(&rig, &report)?;
+    println!("still scene: error {error:+.1}, delay {:?} us", report.delay_us);
+    // One hump each way; their mean lies between them. A blur of one pixel is 50 counts here.
+    assert!(error.abs() < 60.0, "{error}");
+    let tolerance = rig.controller().config().position_tolerance;
+    let Outcome::Focused { position } = report.outcome else { anyhow::bail!("not focused") };
+    assert!(rig.rig().glass(rig.now()).distance(position) <= tolerance);
+    assert_eq!(rig.controller().snapshot().state, FocusState::Focused);
+    for phase in [Phase::Sweeping, Phase::Returning, Phase::Approaching, Phase::Verifying] {
+        assert!(!report.phases[phase as usize].is_zero(), "{phase:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run_and_another_seed_another() -> Result<()> {
+    let (_, first) = run(&config("[simulation]\nshake_px_rms = 1.5")?)?;
+    let (_, again) = run(&config("[simulation]\nshake_px_rms = 1.5")?)?;
+    let (_, other) = run(&config("[simulation]\nshake_px_rms = 1.5\nseed = 2")?)?;
+    assert_eq!(first, again);
+    assert_ne!(first.outcome, other.outcome);
+    Ok(())
+}
+
+#[test]
+fn a_worn_lens_is_brought_to_its_answer_past_backlash() -> Result<()> {
+    let (rig, report) = run(&config("[simulation]\nlens = \"worn\"")?)?;
+    let Outcome::Focused { position } = report.outcome else { anyhow::bail!("{:?}", report.outcome) };
+    let glass = rig.rig().glass(rig.now());
+    // Come from below, the glass is where the lens says; come from above it would be 15 counts off.
+    assert!(
+        glass.distance(position) <= rig.controller().config().position_tolerance + 3.0,
+        "{glass} {position}"
+    );
+    Ok(())
+}
+
+#[test]
+fn one_way_is_half_the_way() -> Result<()> {
+    let mut rig = VirtualRig::new(&config("")?)?;
+    let request = FocusRequest { directions: Some(Directions::Forward), ..FocusRequest::default() };
+    let report = rig.focus(request, |_, _, _| {})?;
+    assert_eq!(report.sweeps().count(), 1);
+    assert!(report.delay_us.is_none());
+    assert_eq!(report.phases[Phase::Returning as usize], std::time::Duration::ZERO);
+    Ok(())
+}
+
+#[test]
+fn every_method_runs_through_the_loop() -> Result<()> {
+    for method in Method::ALL {
+        let mut rig = VirtualRig::new(&config("")?)?;
+        let request = FocusRequest {
+            method: Some(method),
+            directions: Some(Directions::Forward),
+            ..FocusRequest::default()
+        };
+        let report = rig.focus(request, |_, _, _| {})?;
+        let error = error_of(&rig, &report)?;
+        println!("{method}: error {error:+.1}");
+        assert!(error.abs() < 500.0, "{method}: {error}");
+    }
+    Ok(())
+}
+
+#[test]
+fn what_the_rig_cannot_do_ends_with_its_named_reason() -> Result<()> {
+    let second = std::time::Duration::from_secs(1);
+    let lost = FaultKind::EventLoss { share: 0.5, duration: 10 * second };
+    let late = FaultKind::LensPositionLate { by: 3 * second / 10 };
+    let cases = [
+        ("lens-not-moving", fault(FaultKind::LensStalled, FaultTrigger::After(second / 2))?),
+        ("lens-stopped-short", fault(FaultKind::LensStalled, MIDWAY)?),
+        ("lens-lost", fault(FaultKind::LensUnplugged, MIDWAY)?),
+        ("lens-silent", fault(FaultKind::LensSilent, MIDWAY)?),
+        ("camera-lost", fault(FaultKind::CameraUnplugged, MIDWAY)?),
+        ("clock-unusable", fault(FaultKind::CameraTimeReset, MIDWAY)?),
+        ("events-lost", fault(lost, MIDWAY)?),
+        ("direction-mismatch", fault(late, FaultTrigger::After(second))?),
+        ("too-few-events", config("[focus]\nfewest_events = 100000000")?),
+        ("peak-at-edge", config("[simulation]\nfocus_counts = 235\nvelocity_px_per_s = 60")?),
+        ("saturated", saturated()?),
+        ("flicker", flickering()?),
+        ("flat", config("[simulation]\nscene = \"blank-wall\"\nlight = \"dark\"")?),
+    ];
+    for (expected, config) in cases {
+        let (rig, report) = run(&config).with_context(|| expected)?;
+        println!("{expected}: {:?} at {}", report.outcome, report.position_after);
+        assert_eq!(reason_of(&report), expected);
+        assert_eq!(rig.controller().snapshot().state, FocusState::Failed, "{expected}");
+        let Outcome::Failed(failure) = report.outcome else { anyhow::bail!("{expected}") };
+        let went_back = report.position_after.distance(report.position_before)
+            <= rig.controller().config().position_tolerance;
+        assert!(went_back || failure.is_of_lens(), "{expected}: the lens is at {}", report.position_after);
+    }
+    Ok(())
+}
+
+/// A read-out that is slower than the scene.
+fn saturated() -> Result<Config> {
+    let mut config = config("[simulation]\nshake_px_rms = 3.0\n[focus]\nlargest_lost_share = 1.0")?;
+    config.rig.sensor.readout_events_per_s = 150_000.0;
+    Ok(config)
+}
+
+/// Lamps that make nearly all events.
+fn flickering() -> Result<Config> {
+    let mut config = config("")?;
+    config.rig.flicker = Some(Flicker { hertz: 100.0, depth: 0.5 });
+    config.rig.sensor.cutoff_hz = 1000.0;
+    Ok(config)
+}
+
+#[test]
+fn abort_leaves_the_lens_where_it_is() -> Result<()> {
+    let mut rig = VirtualRig::new(&config("")?)?;
+    rig.command(Command::Focus(FocusRequest::default()))?;
+    rig.run_for(std::time::Duration::from_millis(1200));
+    rig.command(Command::Abort)?;
+    rig.run_for(std::time::Duration::from_millis(500));
+    let stopped = rig.rig().glass(rig.now());
+    assert!(stopped.0 > 1000.0 && stopped.0 < 3000.0, "in the middle of the sweep: {stopped}");
+    rig.run_for(std::time::Duration::from_millis(500));
+    assert_eq!(rig.rig().glass(rig.now()), stopped);
+    assert_eq!(rig.controller().snapshot().state, FocusState::Idle);
+    let report = rig.controller().report().context("a report")?;
+    assert_eq!(report.outcome, Outcome::Aborted);
+    Ok(())
+}
+
+#[test]
+fn a_second_trigger_joins_the_run_and_another_request_is_refused() -> Result<()> {
+    let mut rig = VirtualRig::new(&config("")?)?;
+    let first = rig.command(Command::Focus(FocusRequest::default()))?;
+    rig.run_for(std::time::Duration::from_millis(200));
+    let again = rig.command(Command::Focus(FocusRequest::default()))?;
+    assert_ne!(first, again, "started, then under way");
+    let slower = FocusRequest { speed: Some(LensSpeed::new(500.0)?), ..FocusRequest::default() };
+    assert!(matches!(rig.command(Command::Focus(slower)), Err(Refusal::Busy { .. })));
+    assert!(matches!(rig.command(Command::MoveTo(LensPosition(500.0))), Err(Refusal::Busy { .. })));
+    Ok(())
+}
+
+#[test]
+fn the_lens_moves_when_told_and_only_within_its_limits() -> Result<()> {
+    let mut rig = VirtualRig::new(&config("")?)?;
+    rig.command(Command::SetMode(Mode::Manual))?;
+    assert!(matches!(rig.focus(FocusRequest::default(), |_, _, _| {}), Err(VirtualRigError::Refused(_))));
+    rig.command(Command::MoveTo(LensPosition(3000.0)))?;
+    rig.run_for(std::time::Duration::from_secs(3));
+    assert!(rig.rig().glass(rig.now()).distance(LensPosition(3000.0)) < 2.0);
+    assert!(matches!(rig.command(Command::MoveTo(LensPosition(3751.0))), Err(Refusal::OutOfRange { .. })));
+    Ok(())
+}
