@@ -23,7 +23,10 @@ pub struct SystemClock {
 impl SystemClock {
     /// A clock that starts at zero now.
     #[expect(clippy::disallowed_methods, reason = "this is the one place where the system clock is read")]
-    #[expect(clippy::new_without_default, reason = "reading the clock is an effect; a default must have none")]
+    #[expect(
+        clippy::new_without_default,
+        reason = "reading the clock is an effect; a default must have none"
+    )]
     pub fn new() -> Self {
         Self { origin: Instant::now() }
     }
