@@ -148,6 +148,15 @@ impl Sweep<'_> {
         }
     }
 
+    /// Events up to and with `micros` of camera time; times are whole microseconds, so these are the events before the next one.
+    /// Times beyond the newest bin hold nothing more.
+    ///
+    /// # Errors
+    /// As [`events_before`](Self::events_before).
+    pub fn events_until(&self, micros: f64) -> Result<f64, CounterError> {
+        self.events_before((libm::floor(micros) + 1.0).min(self.counter.newest().0 as f64))
+    }
+
     /// Events fed since the start of the sweep.
     pub fn events(&self) -> u64 {
         let (on, off) = self.counter.totals();

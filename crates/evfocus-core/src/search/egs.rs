@@ -58,15 +58,10 @@ pub fn golden_search<E>(
 /// `egs`: golden search on the event rate, a few differences of partial sums a comparison. Equal windows make rates and counts
 /// the same question.
 pub(super) fn search(sweep: &Sweep<'_>) -> Result<Estimate, SearchError> {
-    let before = |micros: f64| sweep.events_before(micros);
-    // Windows are closed, and times are whole microseconds: "up to and with t" is "before floor(t) + 1". The counter ends with
-    // its newest bin, which holds every event there is.
-    let newest_us = sweep.counter.newest().0 as f64;
-    let until = |micros: f64| before((libm::floor(micros) + 1.0).min(newest_us));
     let (range, iterations) = golden_search(bounds(sweep), |first, second| {
         // What both windows hold cancels: compare what only one holds.
-        let only_first = before(second.0)? - before(first.0)?;
-        let only_second = until(second.1)? - until(first.1)?;
+        let only_first = sweep.events_before(second.0)? - sweep.events_before(first.0)?;
+        let only_second = sweep.events_until(second.1)? - sweep.events_until(first.1)?;
         Ok::<_, SearchError>(if only_first + only_second < FEWEST_DECISIVE_EVENTS {
             Comparison::Undecided
         } else if only_first >= only_second {

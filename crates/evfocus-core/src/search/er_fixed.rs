@@ -21,7 +21,7 @@ pub(super) fn search(sweep: &Sweep<'_>, interval: Duration) -> Result<Estimate, 
     while centre <= end {
         let from = (centre - interval_us / 2.0).max(start);
         let to = (centre + interval_us / 2.0).min(end);
-        let count = sweep.counter.count_between(from, to)?.total();
+        let count = sweep.events_until(to)? - sweep.events_before(from)?;
         if count > fullest {
             (fullest, best_us) = (count, centre);
         }
