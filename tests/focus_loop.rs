@@ -160,6 +160,20 @@ fn flickering() -> Result<Config> {
 }
 
 #[test]
+fn hot_pixels_are_learnt_at_rest_and_left_out() -> Result<()> {
+    let clean = run(&config("")?)?.1;
+    let mut with_hot_pixels = config("[simulation]\nhot_pixels = 40")?;
+    with_hot_pixels.rig.sensor.hot_pixel_hz = 3000.0;
+    let report = run(&with_hot_pixels)?.1;
+    assert_eq!((clean.hot_pixels, report.hot_pixels), (0, 40));
+    // Left in, they would add 40 x 3 kHz x 2 s = 240,000 events to the first sweep.
+    let events = |report: &RunReport| report.sweeps().next().map_or(0, |leg| leg.on + leg.off);
+    let surplus = events(&report).abs_diff(events(&clean));
+    assert!(surplus < 20_000, "{surplus}");
+    Ok(())
+}
+
+#[test]
 fn abort_leaves_the_lens_where_it_is() -> Result<()> {
     let mut rig = VirtualRig::new(&config("")?)?;
     rig.command(Command::Focus(FocusRequest::default()))?;

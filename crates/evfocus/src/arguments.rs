@@ -1,4 +1,4 @@
-//! The command line: its subcommands, and the parsers of values that several of them take.
+//! Options and values that several subcommands take.
 
 mod choice;
 mod duration;
@@ -11,68 +11,3 @@ pub use duration::duration;
 pub use position::{position, speed};
 pub use rig::RigArguments;
 pub use socket::SocketArguments;
-
-use clap::{Parser, Subcommand};
-
-use crate::commands::{
-    abort, analyze, completions, demo, devices, focus, info, mode, move_lens, report, simulate, status, watch,
-};
-use crate::exit::Exit;
-
-const AFTER_HELP: &str = "\
-Examples:
-  evfocus demo                                          see a focus run on a simulated rig
-  evfocus focus                                         focus the camera of the running daemon
-  evfocus analyze sweep.raw --positions lens.csv        find focus in a recorded sweep
-  evfocus simulate --out s.raw --positions s.csv --truth s.json && evfocus analyze s.raw --positions s.csv
-
-Units: lens positions are in the lens's own counts, speeds in counts/s, event rates in events/s. Durations on the command line \
-carry their unit (55ms, 0.055s, 800us); in JSON the name ends in the unit (t_us, elapsed_s).
-
-Exit status: 0 focused or done, 1 an error, 2 wrong usage, 3 the run ended without focus.";
-
-/// Focus an event camera with a motorised lens: trigger the daemon, analyze recordings, simulate.
-#[derive(Debug, Parser)]
-#[command(name = "evfocus", version, after_help = AFTER_HELP, max_term_width = 120, arg_required_else_help = true)]
-pub struct Cli {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(Debug, Subcommand)]
-enum Command {
-    Focus(focus::Arguments),
-    Abort(abort::Arguments),
-    Status(status::Arguments),
-    Watch(watch::Arguments),
-    Move(move_lens::Arguments),
-    Mode(mode::Arguments),
-    Devices(devices::Arguments),
-    Report(report::Arguments),
-    Analyze(analyze::Arguments),
-    Info(info::Arguments),
-    Simulate(simulate::Arguments),
-    Demo(demo::Arguments),
-    Completions(completions::Arguments),
-}
-
-impl Cli {
-    /// Does what was asked for.
-    pub fn run(self) -> anyhow::Result<Exit> {
-        match self.command {
-            Command::Focus(arguments) => focus::run(&arguments),
-            Command::Abort(arguments) => abort::run(&arguments),
-            Command::Status(arguments) => status::run(&arguments),
-            Command::Watch(arguments) => watch::run(&arguments),
-            Command::Move(arguments) => move_lens::run(&arguments),
-            Command::Mode(arguments) => mode::run(&arguments),
-            Command::Devices(arguments) => devices::run(&arguments),
-            Command::Report(arguments) => report::run(&arguments),
-            Command::Analyze(arguments) => analyze::run(&arguments),
-            Command::Info(arguments) => info::run(&arguments),
-            Command::Simulate(arguments) => simulate::run(&arguments),
-            Command::Demo(arguments) => demo::run(&arguments),
-            Command::Completions(arguments) => completions::run(&arguments),
-        }
-    }
-}

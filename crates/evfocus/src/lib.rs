@@ -1,13 +1,14 @@
 //! The command line of evfocus: what a person or a script at the rig types.
 //!
-//! - [`commands`] has one file for each subcommand.
-//! - [`arguments`] has the command line itself and the parsers of its values.
+//! - [`cli`] is the command line itself; [`commands`] has one file for each subcommand.
+//! - [`arguments`] has what several of them take.
 //! - `recording` analyzes a sweep on disk with the daemon's own code; `simulation` makes one.
 //! - `plot` draws focus curves as SVG, `curve_view` in a terminal.
 //!
 //! Not its job: focusing. The daemon does that, and [`evfocus_core`] knows how.
 
 pub mod arguments;
+pub mod cli;
 pub mod commands;
 pub mod exit;
 pub mod output;
@@ -24,7 +25,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use arguments::Cli;
+use cli::Cli;
 use exit::Exit;
 
 /// Runs the command that the program's arguments name.

@@ -202,6 +202,19 @@ fn a_state_directory_that_cannot_be_made_costs_only_the_files() -> Result<()> {
 }
 
 #[test]
+fn a_state_directory_that_may_not_be_written_is_named_with_the_remedy() -> Result<()> {
+    // Not even root makes directories here.
+    let folder = tempfile::tempdir()?;
+    symlink("/sys/kernel", folder.path().join("state"))?;
+    let daemon = Daemon::start_in(folder)?;
+    block_on(async {
+        let fault = Client::connect(&daemon.socket()).await?.status().await?.fault.context("a fault")?;
+        assert!(fault.contains("state") && fault.contains("let the daemon's user write there"), "{fault}");
+        Ok(())
+    })
+}
+
+#[test]
 fn a_socket_in_use_is_refused_and_its_owner_lives() -> Result<()> {
     let daemon = Daemon::start()?;
     let socket = daemon.socket();

@@ -14,8 +14,8 @@ use crate::{Error, ProtocolError};
 pub enum ClientError {
     /// There is no socket.
     #[error(
-        "there is no socket {}: is evfocusd running? Start it with `systemctl start evfocusd` or `evfocusd --config FILE`, \
-         or name the right socket", path.display()
+        "there is no socket {0}: is evfocusd running? Start it with `evfocusd --socket {0}`, or name the right socket",
+        path.display()
     )]
     NotRunning {
         /// Where it should be.
@@ -23,8 +23,8 @@ pub enum ClientError {
     },
     /// There is a socket, but nobody listens.
     #[error(
-        "nobody listens on {}: evfocusd has died and left its socket behind. Start it again with \
-         `systemctl start evfocusd` or `evfocusd --config FILE`", path.display()
+        "nobody listens on {0}: evfocusd has died and left its socket behind. Start it again with `evfocusd --socket {0}`",
+        path.display()
     )]
     Stale {
         /// The socket.

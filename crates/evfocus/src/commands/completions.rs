@@ -1,9 +1,8 @@
 //! `evfocus completions`: for shells.
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use crate::arguments::Cli;
 use crate::exit::Exit;
 use crate::output::Output;
 
@@ -19,11 +18,11 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the script.
-pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
+/// Prints the script that completes `command`.
+pub fn run(arguments: &Arguments, command: &mut Command) -> anyhow::Result<Exit> {
     // Generation goes through memory, for it gives up on a closed pipe with a panic.
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Cli::command(), "evfocus", &mut script);
+    clap_complete::generate(arguments.shell, command, "evfocus", &mut script);
     std::io::Write::write_all(&mut Output::new(), &script)?;
     Ok(Exit::Done)
 }
