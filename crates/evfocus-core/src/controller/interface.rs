@@ -50,7 +50,7 @@ pub enum Action {
     },
     /// Stop the lens where it is.
     StopLens,
-    /// A run ended; [`Controller::report`] has its record.
+    /// A run ended; [`Controller::report`](super::Controller::report) has its record.
     RunEnded,
 }
 
