@@ -2,7 +2,6 @@
 
 use std::future::Future;
 use std::sync::Arc;
-use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -23,7 +22,8 @@ use crate::reports::ReportStore;
 use crate::service;
 use crate::threads::camera::{BATCH_EVENTS, BATCHES, CameraThread};
 use crate::threads::control::{CURVE_POINTS, ControlThread, Publications, REPORTS};
-use crate::threads::lens::{LensThread, ORDERS, SAMPLES};
+use crate::threads::lens::{LensThread, SAMPLES};
+use crate::threads::orders::orders;
 use crate::threads::{NOTICES, StopFlag};
 
 /// Commands from clients that may wait for the control thread, which looks every 2 ms.
@@ -33,7 +33,8 @@ const START_TIME: Duration = Duration::from_secs(2);
 /// How long the threads have to end; systemd gives 90 s.
 const STOP_TIME: Duration = Duration::from_secs(5);
 
-/// Runs the daemon of `config` until `shutdown` completes; `ready` is called once clients are served.
+/// Runs the daemon of `config` until `shutdown` completes; `ready` is called once the socket takes connections and the lens has
+/// answered.
 ///
 /// Needs a current-thread tokio runtime with time and input/output.
 ///
@@ -63,10 +64,9 @@ pub async fn run(
         }
     };
     service::serve(socket, handle, Limits::default(), until).await;
-    let stopped = running.stop().await;
+    running.stop().await?;
     // The control thread is gone, so the publisher ends once it has written the last report.
     tokio::time::timeout(STOP_TIME, publisher).await.context("the last report was not written in time")??;
-    stopped?;
     if died {
         bail!("a thread of the daemon has ended by itself; the lens is stopped; the log says more");
     }
@@ -109,7 +109,7 @@ impl Running {
         let (camera_notices_in, camera_notices_out) = RingBuffer::new(NOTICES);
         let (lens_notices_in, lens_notices_out) = RingBuffer::new(NOTICES);
         let (curve_in, curve_out) = RingBuffer::new(CURVE_POINTS);
-        let (orders_in, orders_out) = sync_channel(ORDERS);
+        let (orders_in, orders_out) = orders();
         let (commands_in, commands_out) = mpsc::channel(COMMANDS);
         let (reports_in, reports_out) = mpsc::channel(REPORTS);
         let (snapshots_in, snapshots_out) = watch::channel(controller.snapshot());
@@ -157,7 +157,8 @@ impl Running {
             lens: devices::name(&lens_info.model, &lens_info.serial),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
-        let lookups = DaemonLookups { camera: camera_info, lens: lens_info, reports: store.clone() };
+        let lookups =
+            DaemonLookups { camera: camera_info, lens: lens_info, reports: store.clone(), status: status_out.clone() };
         let followers = progress_in.downgrade();
         let publisher = Publisher {
             snapshots: snapshots_out,
@@ -178,7 +179,7 @@ impl Running {
             },
             publisher: Some(publisher),
             stop,
-            threads: vec![("control", control), ("camera", camera), ("lens", lens)],
+            threads: vec![("evfocus-control", control), ("evfocus-lens", lens), ("evfocus-camera", camera)],
             ended,
         })
     }
@@ -194,19 +195,22 @@ impl Running {
     }
 
     /// Stops the control thread, which stops the lens, and waits for all.
-    async fn stop(mut self) -> anyhow::Result<()> {
+    async fn stop(self) -> anyhow::Result<()> {
         self.stop.stop();
-        let threads = std::mem::take(&mut self.threads);
-        let join = tokio::task::spawn_blocking(move || {
-            threads
-                .into_iter()
-                .filter_map(|(name, thread)| thread.join().is_err().then_some(name))
-                .collect::<Vec<_>>()
-        });
-        let panicked =
-            tokio::time::timeout(STOP_TIME, join).await.context("the threads did not stop in time")??;
+        let (mut hung, mut panicked) = (Vec::new(), Vec::new());
+        for (name, thread) in self.threads {
+            let join = tokio::task::spawn_blocking(move || thread.join());
+            match tokio::time::timeout(STOP_TIME, join).await {
+                Ok(Ok(Ok(()))) => {}
+                Ok(_) => panicked.push(name),
+                Err(_) => hung.push(name),
+            }
+        }
+        if !hung.is_empty() {
+            bail!("still busy {STOP_TIME:?} after they were told to stop: {}; the lens may be moving", hung.join(", "));
+        }
         if !panicked.is_empty() {
-            bail!("the {} thread has panicked; the log says where", panicked.join(" and the "));
+            bail!("panicked: {}; the lens is stopped; the log says where", panicked.join(", "));
         }
         Ok(())
     }
@@ -240,22 +244,24 @@ struct DaemonLookups {
     camera: CameraInfo,
     lens: LensInfo,
     reports: Reports,
+    status: watch::Receiver<Arc<Status>>,
 }
 
 impl Lookups for DaemonLookups {
     fn devices(&self) -> Result<Vec<Device>, Error> {
-        let device = |role, model: &str, serial: &str| Device {
+        let status = Arc::clone(&self.status.borrow());
+        let device = |role, model: &str, serial: &str, is_there: bool| Device {
             role,
             driver: "simulated".to_owned(),
             model: model.to_owned(),
             serial: serial.to_owned(),
             location: "simulated".to_owned(),
-            state: DeviceState::Active,
-            message: None,
+            state: if is_there { DeviceState::Active } else { DeviceState::Missing },
+            message: if is_there { None } else { status.fault.clone() },
         };
         Ok(vec![
-            device(DeviceRole::Camera, &self.camera.model, &self.camera.serial),
-            device(DeviceRole::Lens, &self.lens.model, &self.lens.serial),
+            device(DeviceRole::Camera, &self.camera.model, &self.camera.serial, status.camera.is_some()),
+            device(DeviceRole::Lens, &self.lens.model, &self.lens.serial, status.lens.is_some()),
         ])
     }
 

@@ -35,7 +35,7 @@ fn start(arguments: &Arguments) -> anyhow::Result<()> {
     let config = arguments.configuration()?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("cannot start tokio")?;
-    runtime.block_on(async {
+    let ended = runtime.block_on(async {
         let (mut terminate, mut interrupt) =
             (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
         let shutdown = async move {
@@ -45,5 +45,8 @@ fn start(arguments: &Arguments) -> anyhow::Result<()> {
             }
         };
         daemon::run(config, || {}, shutdown).await
-    })
+    });
+    // A device call that hangs must not keep the process: it has been named in the error.
+    runtime.shutdown_background();
+    ended
 }

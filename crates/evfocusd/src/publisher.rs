@@ -55,8 +55,6 @@ impl std::fmt::Debug for Publisher {
 struct News {
     fault: Option<String>,
     last_run: Option<ipc::LastRun>,
-    run: Option<RunId>,
-    run_started_unix_s: f64,
 }
 
 /// The reports on disk, and the newest one in memory: a full disk must not swallow it.
@@ -115,8 +113,6 @@ impl Publisher {
         let mut news = News {
             fault: self.store.fault(),
             last_run: self.store.read(None).ok().map(|report| last_run(&report)),
-            run: None,
-            run_started_unix_s: 0.0,
         };
         loop {
             tokio::select! {
@@ -124,7 +120,7 @@ impl Publisher {
                     if changed.is_err() {
                         break;
                     }
-                    self.publish_snapshot(&mut news);
+                    self.publish_snapshot(&news);
                 }
                 Some(run) = self.reports.recv() => self.publish_report(&run, &mut news).await,
             }
@@ -134,12 +130,8 @@ impl Publisher {
         }
     }
 
-    fn publish_snapshot(&mut self, news: &mut News) {
+    fn publish_snapshot(&mut self, news: &News) {
         let snapshot = *self.snapshots.borrow_and_update();
-        if snapshot.run != news.run {
-            news.run = snapshot.run;
-            news.run_started_unix_s = unix_time().as_secs_f64();
-        }
         let curve_points = self.send_curve(&snapshot);
         if let Some(run) = snapshot.run
             && !curve_points
@@ -153,7 +145,7 @@ impl Publisher {
         let snapshot = *self.snapshots.borrow();
         self.send_curve(&snapshot);
         let circumstances = wire::Circumstances {
-            started_unix_s: news.run_started_unix_s,
+            started_unix_s: unix_time().saturating_sub(self.clock.now().since(run.started)).as_secs_f64(),
             devices: self.constants.devices.clone(),
         };
         let report = Arc::new(wire::report(run, circumstances));
@@ -186,12 +178,12 @@ impl Publisher {
         let missing = match (snapshot.camera_ready, snapshot.lens_ready) {
             (true, true) => None,
             (false, true) => {
-                Some("the camera does not answer: check its cable; the log has its words".to_owned())
+                Some("the camera does not answer: check its cable, then restart evfocusd; the log has its words".to_owned())
             }
             (true, false) => {
                 Some("the lens does not answer: check its cable; the log has its words".to_owned())
             }
-            (false, false) => Some("neither camera nor lens answers: check their cables".to_owned()),
+            (false, false) => Some("neither camera nor lens answers: check their cables, then restart evfocusd".to_owned()),
         };
         Status {
             mode: wire::mode(snapshot.mode),

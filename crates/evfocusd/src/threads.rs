@@ -6,11 +6,12 @@
 //! | `evfocus-control` | being woken, at most 2 ms | batches, samples, notices, commands | orders, snapshots, curve points, reports | the stop flag |
 //! | `evfocus-lens` | orders, until the next poll is due | orders | samples, notices | the end of the orders' queue |
 //!
-//! Every queue is bounded. The lens is stopped when its orders end, whatever ended them: a clean stop, an error, a panic.
+//! Every queue is bounded; orders are a slot in which the latest motion counts. The lens is stopped when its orders end, whatever ended them: a clean stop, an error, a panic.
 
 pub(crate) mod camera;
 pub(crate) mod control;
 pub(crate) mod lens;
+pub(crate) mod orders;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

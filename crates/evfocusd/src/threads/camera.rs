@@ -65,18 +65,20 @@ impl CameraThread {
                 }
                 continue;
             }
-            let mut batch = self.empty.pop().unwrap_or_else(|_| std::mem::take(&mut spare));
-            match self.camera.read(&mut batch, READ_TIMEOUT) {
-                Ok(()) => {
-                    batch.lost += std::mem::take(&mut lost);
-                    lost = self.hand_over(batch, &mut spare);
-                }
-                Err(error) => {
-                    batch.clear();
-                    lost = self.hand_over(batch, &mut spare);
-                    self.fail(&error);
-                    failed = true;
-                }
+            let mut batch = self.empty.pop().ok();
+            let room = batch.as_mut().unwrap_or(&mut spare);
+            let outcome = self.camera.read(room, READ_TIMEOUT);
+            if outcome.is_err() {
+                room.clear();
+            }
+            room.lost += std::mem::take(&mut lost);
+            match batch {
+                Some(batch) => self.hand_over(batch),
+                None => lost = spare.lost + spare.events.len() as u64,
+            }
+            if let Err(error) = outcome {
+                self.fail(&error);
+                failed = true;
             }
         }
         if let Err(error) = self.camera.stop() {
@@ -84,18 +86,12 @@ impl CameraThread {
         }
     }
 
-    /// Passes `batch` on. Where there is no room, it becomes the spare one, and its events are lost: returns how many.
-    fn hand_over(&mut self, batch: EventBatch, spare: &mut EventBatch) -> u64 {
-        let lost = match self.filled.push(batch) {
-            Ok(()) => 0,
-            Err(rtrb::PushError::Full(batch)) => {
-                let lost = batch.lost + batch.events.len() as u64;
-                *spare = batch;
-                lost
-            }
-        };
+    /// Passes `batch` on. There is a place for every batch, so the way is never full.
+    fn hand_over(&mut self, batch: EventBatch) {
+        if self.filled.push(batch).is_err() {
+            tracing::error!("a batch did not find its way to the control thread");
+        }
         self.control.unpark();
-        lost
     }
 
     fn fail(&mut self, error: &DeviceError) {

@@ -1,15 +1,15 @@
 //! `evfocus-control`: feeds the controller and does what it decides.
 
 use std::sync::Arc;
-use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::Duration;
 
-use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, DeviceFailure, Input, Snapshot};
+use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, Input, Snapshot};
 use evfocus_core::{Controller, CurvePoint, EventBatch, HostMicros, LensSample, RunId, RunReport};
 use evfocus_hal::Clock;
 use rtrb::{Consumer, Producer};
 use tokio::sync::{mpsc, watch};
 
+use super::orders::OrderSender;
 use super::{Notice, StopFlag};
 use crate::handle::Command;
 use crate::wire;
@@ -53,7 +53,7 @@ pub(crate) struct ControlThread {
     /// Commands from the socket.
     pub(crate) commands: mpsc::Receiver<Command>,
     /// Orders to the lens.
-    pub(crate) orders: SyncSender<Action>,
+    pub(crate) orders: OrderSender,
     /// To the socket's side.
     pub(crate) publications: Publications,
     /// When to end.
@@ -157,28 +157,11 @@ impl ControlThread {
     }
 
     fn perform(&mut self, actions: &mut Vec<Action>) {
-        let mut done = 0;
-        while let Some(&action) = actions.get(done) {
-            done += 1;
+        for action in actions.drain(..) {
             if action == Action::RunEnded {
                 self.hand_over_report();
             } else {
-                self.order(action, actions);
-            }
-        }
-        actions.clear();
-    }
-
-    fn order(&mut self, action: Action, actions: &mut Vec<Action>) {
-        match self.orders.try_send(action) {
-            Ok(()) => {}
-            Err(TrySendError::Full(_)) => {
-                tracing::error!(?action, "the lens does not take orders");
-                self.controller.handle(Input::LensFailed(DeviceFailure::Silent), self.clock.now(), actions);
-            }
-            Err(TrySendError::Disconnected(_)) => {
-                tracing::error!(?action, "the lens thread has ended");
-                self.controller.handle(Input::LensFailed(DeviceFailure::Gone), self.clock.now(), actions);
+                self.orders.send(action);
             }
         }
     }

@@ -1,0 +1,139 @@
+//! Orders to the lens: the latest motion counts, and a stop is never lost.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use evfocus_core::controller::Action;
+
+/// What the lens is to do next. A slot rather than a queue: a motion that has been replaced need not be begun, so there is
+/// always room, however many callers move the lens at once.
+#[derive(Debug, Default)]
+struct Slot {
+    stop: bool,
+    motion: Option<Action>,
+    closed: bool,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    slot: Mutex<Slot>,
+    filled: Condvar,
+}
+
+impl Shared {
+    /// The slot holds plain data that is whole after every statement, so a panic elsewhere does not spoil it.
+    fn slot(&self) -> MutexGuard<'_, Slot> {
+        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The control thread's end. Dropping it ends the orders.
+#[derive(Debug)]
+pub(crate) struct OrderSender(Arc<Shared>);
+
+/// The lens thread's end.
+#[derive(Debug)]
+pub(crate) struct OrderReceiver(Arc<Shared>);
+
+/// What comes out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Received {
+    /// Do this.
+    Order(Action),
+    /// Nothing was ordered in time.
+    Nothing,
+    /// There will be no more orders.
+    End,
+}
+
+/// The two ends of a slot.
+pub(crate) fn orders() -> (OrderSender, OrderReceiver) {
+    let shared = Arc::new(Shared::default());
+    (OrderSender(Arc::clone(&shared)), OrderReceiver(shared))
+}
+
+impl OrderSender {
+    /// Orders `action`. A stop takes back a motion that has not been begun; a motion replaces one.
+    pub(crate) fn send(&self, action: Action) {
+        let mut slot = self.0.slot();
+        match action {
+            Action::StopLens => (slot.stop, slot.motion) = (true, None),
+            Action::Home | Action::MoveLens { .. } => slot.motion = Some(action),
+            Action::RunEnded => return,
+        }
+        self.0.filled.notify_one();
+    }
+}
+
+impl Drop for OrderSender {
+    fn drop(&mut self) {
+        self.0.slot().closed = true;
+        self.0.filled.notify_one();
+    }
+}
+
+impl OrderReceiver {
+    /// Waits for an order for at most `timeout`; a stop comes before the motion that was ordered after it.
+    pub(crate) fn receive(&self, timeout: Duration) -> Received {
+        let is_empty = |slot: &mut Slot| !slot.stop && slot.motion.is_none() && !slot.closed;
+        let slot = self.0.filled.wait_timeout_while(self.0.slot(), timeout, is_empty);
+        let mut slot = slot.unwrap_or_else(PoisonError::into_inner).0;
+        if std::mem::take(&mut slot.stop) {
+            Received::Order(Action::StopLens)
+        } else if let Some(motion) = slot.motion.take() {
+            Received::Order(motion)
+        } else if slot.closed {
+            Received::End
+        } else {
+            Received::Nothing
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use evfocus_core::{LensPosition, LensSpeed};
+
+    use super::*;
+
+    fn to(position: f64) -> Action {
+        Action::MoveLens { target: LensPosition(position), speed: LensSpeed::new(1.0).unwrap() }
+    }
+
+    fn all(receiver: &OrderReceiver) -> Vec<Received> {
+        std::iter::from_fn(|| Some(receiver.receive(Duration::ZERO)))
+            .take_while(|received| matches!(received, Received::Order(_)))
+            .collect()
+    }
+
+    #[test]
+    fn the_latest_motion_counts_and_there_is_always_room() {
+        let (sender, receiver) = orders();
+        for position in 0..1000 {
+            sender.send(to(f64::from(position)));
+        }
+        assert_eq!(all(&receiver), [Received::Order(to(999.0))]);
+    }
+
+    #[test]
+    fn a_stop_is_never_lost_and_takes_back_what_was_not_begun() {
+        let (sender, receiver) = orders();
+        sender.send(to(1.0));
+        sender.send(Action::StopLens);
+        assert_eq!(all(&receiver), [Received::Order(Action::StopLens)]);
+        sender.send(Action::StopLens);
+        sender.send(to(2.0));
+        sender.send(to(3.0));
+        assert_eq!(all(&receiver), [Received::Order(Action::StopLens), Received::Order(to(3.0))]);
+    }
+
+    #[test]
+    fn the_end_comes_after_the_last_order() {
+        let (sender, receiver) = orders();
+        assert_eq!(receiver.receive(Duration::ZERO), Received::Nothing);
+        sender.send(Action::StopLens);
+        drop(sender);
+        assert_eq!(receiver.receive(Duration::ZERO), Received::Order(Action::StopLens));
+        assert_eq!(receiver.receive(Duration::ZERO), Received::End);
+    }
+}
