@@ -26,6 +26,8 @@ enum Reason {
     Frame(#[from] FrameError),
     #[error("the client sent what is not a Varlink call: {0}")]
     Garbage(#[source] serde_json::Error),
+    #[error("the client wants many replies and none: the call is both `more` and `oneway`")]
+    ManyAndNone,
     #[error("a reply cannot be encoded: {0}")]
     Encoding(#[source] serde_json::Error),
     #[error("the client has not read a reply of {bytes} bytes within {limit:?}")]
@@ -83,6 +85,10 @@ async fn serve<S: Service>(
 ) -> Result<(), Closed> {
     while let Some(frame) = reader.next().await.map_err(Reason::from)? {
         let call: Call = serde_json::from_slice(frame).map_err(Reason::Garbage)?;
+        // Varlink excludes the pair. A stream that writes nothing would never learn that its client has gone away.
+        if call.more && call.oneway {
+            return Err(Reason::ManyAndNone.into());
+        }
         writer.muted = call.oneway;
         match answer(call, writer, service).await {
             Ok(()) => {}

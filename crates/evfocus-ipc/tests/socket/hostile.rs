@@ -146,6 +146,24 @@ async fn one_way_calls_are_answered_with_silence() {
 }
 
 #[tokio::test]
+async fn streams_that_nobody_wants_to_hear_take_no_place() {
+    let served = serve(limits());
+    let mut polite = served.client().await;
+    for _ in 0..limits().clients {
+        for method in ["Monitor", "Focus"] {
+            let call = format!(
+                "{{\"method\": \"org.evfocus.Controller.{method}\", \"more\": true, \"oneway\": true}}\0"
+            );
+            let mut stream = say(&served.path, call.as_bytes()).await;
+            assert_eq!(guarded(hear(&mut stream)).await, "", "{method} is hung up on");
+        }
+    }
+    assert_eq!(served.service.sent.load(Ordering::Relaxed), 0);
+    guarded(polite.status()).await.unwrap();
+    guarded(async { while served.client().await.status().await.is_err() {} }).await;
+}
+
+#[tokio::test]
 async fn wrong_calls_are_answered_with_typed_errors_and_the_connection_goes_on() {
     let served = serve(limits());
     let mut stream = UnixStream::connect(&served.path).await.unwrap();

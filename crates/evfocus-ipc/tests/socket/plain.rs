@@ -36,6 +36,7 @@ impl Service for Plain {
                 loop {
                     stream.send(&Reply::Status { status: Arc::clone(&status) }).await?;
                     self.sent.fetch_add(1, Ordering::Relaxed);
+                    tokio::task::yield_now().await;
                 }
             }
             (Request::Monitor, None) => Err(ProtocolError::ExpectedMore {}.into()),
