@@ -10,8 +10,8 @@ use crate::{DeviceRole, Mode};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(tag = "error", content = "parameters")]
 pub enum Error {
-    /// A run with other parameters is under way.
-    #[error("run {run_id} is under way with other parameters; wait for its end, or abort it first")]
+    /// A run is under way: one with other parameters, or one that needs the lens.
+    #[error("run {run_id} is under way; wait for its end, or abort it first")]
     #[serde(rename = "org.evfocus.Controller.Busy")]
     Busy {
         /// The run under way.
@@ -169,4 +169,15 @@ pub enum ProtocolError {
     #[error("the method replies many times: call it with the flag `more`")]
     #[serde(rename = "org.varlink.service.ExpectedMore")]
     ExpectedMore {},
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn busy_fits_a_motion_as_well_as_a_second_run() {
+        let text = Error::Busy { run_id: 3 }.to_string();
+        assert_eq!(text, "run 3 is under way; wait for its end, or abort it first");
+    }
 }
