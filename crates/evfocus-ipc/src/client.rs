@@ -82,7 +82,8 @@ impl Client {
         self.call::<results::Nothing>(&Request::SetMode { mode }).await.map(drop)
     }
 
-    /// Follows the status: at once, whenever it changes, and once a second if it does not.
+    /// Follows the status: now, whenever it changes, and once a second if it does not. A change of the lens's position or of
+    /// the lost events alone is told at most ten times a second, one of the event rate alone with the next second.
     pub async fn monitor(self) -> Result<Following<Status>, ClientError> {
         self.follow(&Request::Monitor).await
     }

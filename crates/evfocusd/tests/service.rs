@@ -5,9 +5,12 @@
 #[path = "service/fake.rs"]
 mod fake;
 
+use std::time::Duration;
+
 use evfocus_ipc::client::ClientError;
-use evfocus_ipc::{Error, FocusRequest, Mode, State};
+use evfocus_ipc::{Error, FocusRequest, Mode, State, Status};
 use fake::{BACKLOG, RANGE, Rig, limits};
+use tokio::time::Instant;
 
 #[tokio::test]
 async fn the_status_is_what_the_control_thread_last_published() {
@@ -124,6 +127,52 @@ async fn the_monitor_sends_changes_at_once_and_a_heartbeat_without_them() {
     assert_eq!(monitor.next().await.unwrap().unwrap().events_lost, 5);
     // Nothing changes any more.
     assert_eq!(monitor.next().await.unwrap().unwrap().events_lost, 5);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_monitor_paces_numbers_and_nothing_else() {
+    let rig = Rig::start(limits());
+    let tick = Duration::from_millis(20);
+    let count = async |change: &dyn Fn(&mut Status, u32)| {
+        let mut monitor = rig.client().await.monitor().await.unwrap();
+        monitor.next().await.unwrap();
+        let mut heard = 0;
+        let end = Instant::now() + Duration::from_secs(5);
+        let mut ticks = tokio::time::interval(tick);
+        let mut number = 0;
+        while Instant::now() < end {
+            tokio::select! {
+                status = monitor.next() => { status.unwrap().unwrap(); heard += 1; }
+                _now = ticks.tick() => { number += 1; rig.fake.change(|status| change(status, number)); }
+            }
+        }
+        heard
+    };
+    let measured = count(&|status, number| {
+        status.event_rate = f64::from(number);
+        status.uptime_s += 0.02;
+    });
+    let measured = measured.await;
+    assert!((4..=6).contains(&measured), "{measured} in 5 s though only the rate changed");
+    let moving = count(&|status, number| status.lens_position = Some(f64::from(number))).await;
+    assert!((40..=51).contains(&moving), "{moving} in 5 s while the lens moved");
+    let told = count(&|status, number| status.fault = Some(format!("fault {number}"))).await;
+    assert!(told >= 240, "{told} of 250 changes of the fault were told");
+}
+
+#[tokio::test(start_paused = true)]
+async fn news_are_told_at_once_even_just_after_a_number() {
+    let rig = Rig::start(limits());
+    let mut monitor = rig.client().await.monitor().await.unwrap();
+    monitor.next().await.unwrap();
+    rig.fake.change(|status| status.lens_position = Some(300.0));
+    assert_eq!(monitor.next().await.unwrap().unwrap().lens_position, Some(300.0));
+    let told = Instant::now();
+    rig.fake.change(|status| status.lens_position = Some(301.0));
+    rig.fake.change(|status| status.lens_moving = true);
+    let status = monitor.next().await.unwrap().unwrap();
+    assert_eq!((status.lens_position, status.lens_moving), (Some(301.0), true));
+    assert!(told.elapsed() < Duration::from_millis(50), "{:?}", told.elapsed());
 }
 
 #[tokio::test]

@@ -18,6 +18,9 @@ Examples:
   evfocus watch
   evfocus watch --json | jq --unbuffered .event_rate
 
+A line at once for every change of mode, state, run, devices or fault; at most ten a second while only the lens position changes; \
+one a second while nothing does but the event rate.
+
 Ends with Ctrl-C, when nobody reads the output any more, or with an error when the daemon goes away.
 
 Units: lens positions in counts, event rates in events per second. With --json every line is one JSON object, the same as that \

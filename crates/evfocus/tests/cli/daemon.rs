@@ -93,6 +93,14 @@ fn a_session_with_the_daemon() {
     daemon.refuses(&["report"], &["no report"]);
     daemon.refuses(&["move", "9999"], &["9999", "3750"]);
     daemon.refuses(&["focus", "--method", "guess"], &["guess", "egs"]);
+    let speed = daemon.run(&["focus", "--speed", "1"]);
+    let message = stderr(&speed);
+    assert!(message.starts_with("error: --speed: ") && !message.contains("counts_per_s"), "{message}");
+    assert_eq!(message.matches("a sweep of").count(), 1, "{message}");
+    daemon.refuses(&["focus", "--speed", "1e6"], &["error: --speed is 1000000; it must be from 0 to "]);
+    let interval = daemon.run(&["focus", "--method", "er-fixed", "--interval", "9s"]);
+    assert!(stderr(&interval).starts_with("error: --interval: an interval of 9 s"), "{}", stderr(&interval));
+    daemon.refuses(&["focus", "--from", "1", "--to", "2"], &["error: --from", "220", "3750"]);
     assert_eq!(daemon.json(&["abort", "--json"])["run_id"], Value::Null);
 
     let moved = daemon.json(&["move", "400", "--wait", "--json"]);
@@ -140,6 +148,22 @@ fn an_aborted_run_is_status_3() {
     assert_eq!(output.status.code(), Some(3));
     let report: Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!((&report["run_id"], &report["result"]["state"]), (&aborted, &"idle".into()));
+}
+
+#[test]
+fn watching_an_idle_daemon_prints_a_line_a_second() {
+    use std::io::BufRead;
+    let daemon = Daemon::start();
+    let mut watch = daemon.command(&["watch", "--json"]).stdout(Stdio::piped()).spawn().unwrap();
+    let lines = std::io::BufReader::new(watch.stdout.take().unwrap()).lines();
+    let statuses: Vec<Value> =
+        lines.take(8).map(|line| serde_json::from_str(&line.unwrap()).unwrap()).collect();
+    watch.kill().unwrap();
+    watch.wait().unwrap();
+    // The first ones may tell that the lens has come to rest.
+    let uptimes: Vec<f64> = statuses.iter().map(|status| number(status, "uptime_s")).collect();
+    let steps: Vec<f64> = uptimes.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(steps.iter().skip(3).all(|&step| step > 0.8), "{steps:?}");
 }
 
 #[test]

@@ -7,24 +7,64 @@ use evfocus_ipc::server::{CallError, Stream};
 use evfocus_ipc::{Error, Progress, Reply, Status};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{broadcast, watch};
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout_at};
 
 /// The status is sent at least this often. Only writing tells that a client has gone away, and only reading tells the
 /// client that the daemon is alive.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Sends the status now, whenever it changes, and at least once per heartbeat. A slow client gets the latest, not all.
+/// The least time from one status to the next if all that has changed are [quantities](differ_in_quantities), which
+/// change all the time: what an eye can follow.
+const PACE: Duration = Duration::from_millis(100);
+
+/// Sends the status now, whenever it changes, and at least once per heartbeat. Quantities that change are paced, and what is
+/// measured anew all the time is no change at all. A slow client gets the latest, not all.
 pub(super) async fn status(
     mut status: watch::Receiver<Arc<Status>>,
     stream: &mut Stream<'_>,
 ) -> Result<Reply, CallError> {
+    let mut sent = Arc::clone(&status.borrow_and_update());
+    loop {
+        stream.send(&Reply::Status { status: Arc::clone(&sent) }).await?;
+        sent = next(&mut status, &sent).await?;
+    }
+}
+
+/// The status to be sent after `sent`, when it is time.
+async fn next(status: &mut watch::Receiver<Arc<Status>>, sent: &Status) -> Result<Arc<Status>, Error> {
+    let since = Instant::now();
     loop {
         let latest = Arc::clone(&status.borrow_and_update());
-        stream.send(&Reply::Status { status: latest }).await?;
-        if let Ok(Err(_gone)) = timeout(HEARTBEAT, status.changed()).await {
-            return Err(Error::ShuttingDown {}.into());
+        let due = if differ_in_words(&latest, sent) {
+            since
+        } else if differ_in_quantities(&latest, sent) {
+            since + PACE
+        } else {
+            since + HEARTBEAT
+        };
+        if due <= Instant::now() {
+            return Ok(latest);
+        }
+        if let Ok(Err(_gone)) = timeout_at(due, status.changed()).await {
+            return Err(Error::ShuttingDown {});
         }
     }
+}
+
+/// Whether anything but numbers is new: a field that this does not know of counts as well.
+fn differ_in_words(one: &Status, other: &Status) -> bool {
+    let words = |status: &Status| Status {
+        lens_position: None,
+        events_lost: 0,
+        event_rate: 0.0,
+        uptime_s: 0.0,
+        ..status.clone()
+    };
+    words(one) != words(other)
+}
+
+fn differ_in_quantities(one: &Status, other: &Status) -> bool {
+    (one.lens_position, one.events_lost) != (other.lens_position, other.events_lost)
 }
 
 /// Follows run `run_id` until it is done; sends what comes before the end into `stream`, if there is one.
