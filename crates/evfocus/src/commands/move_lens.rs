@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::bail;
 use clap::Args;
+use evfocus_ipc::Status;
 use evfocus_ipc::client::Client;
 use serde_json::json;
 
@@ -69,17 +70,51 @@ async fn wait(client: Client, target: f64) -> anyhow::Result<f64> {
             () = &mut patience, if !has_moved => bail!("the lens does not move; evfocus status may say why"),
         };
         let Some(status) = status else { bail!("evfocusd stopped telling where the lens is") };
-        if let Some(fault) = status.fault {
-            bail!("the lens did not arrive: {fault}");
-        }
-        let Some(position) = status.lens_position else { continue };
-        let tolerance = status.lens_range.map_or(1.0, |range| NEAR_SHARE * (range.max - range.min));
-        if status.lens_moving {
-            has_moved = true;
-        } else if (position - target).abs() <= tolerance {
+        has_moved |= status.lens_moving;
+        if let Some(position) = arrival(&status, target, has_moved)? {
             return Ok(position);
-        } else if has_moved {
-            bail!("the lens stands at {position:.1} counts, not at {target:.1}; evfocus status may say why");
         }
+    }
+}
+
+/// Where the lens has come to rest, if it has; an error if it will not any more. A fault that is not the lens's, such as a full
+/// disk, does not stop it.
+fn arrival(status: &Status, target: f64, has_moved: bool) -> anyhow::Result<Option<f64>> {
+    if status.lens.is_none() {
+        bail!("the lens did not arrive: {}", status.fault.as_deref().unwrap_or("there is no lens any more"));
+    }
+    let Some(position) = status.lens_position.filter(|_| !status.lens_moving) else { return Ok(None) };
+    let tolerance = status.lens_range.map_or(1.0, |range| NEAR_SHARE * (range.max - range.min));
+    if (position - target).abs() <= tolerance {
+        return Ok(Some(position));
+    }
+    if has_moved {
+        bail!("the lens stands at {position:.1} counts, not at {target:.1}; evfocus status may say why");
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(position: f64) -> Status {
+        Status { lens: Some(String::from("a lens")), lens_position: Some(position), ..Status::default() }
+    }
+
+    #[test]
+    fn only_a_fault_of_the_lens_ends_the_wait() {
+        let full = Some(String::from("the disk is full"));
+        let moving = Status { fault: full.clone(), lens_moving: true, ..at(500.0) };
+        assert_eq!(arrival(&moving, 400.0, true).unwrap(), None);
+        assert_eq!(arrival(&Status { fault: full.clone(), ..at(400.0) }, 400.0, true).unwrap(), Some(400.0));
+        let gone = Status { lens: None, fault: full, ..moving };
+        assert!(arrival(&gone, 400.0, true).unwrap_err().to_string().contains("the disk is full"));
+    }
+
+    #[test]
+    fn a_lens_that_stops_short_has_not_arrived_and_one_that_has_not_started_may_yet() {
+        assert!(arrival(&at(500.0), 400.0, true).unwrap_err().to_string().contains("500.0"));
+        assert_eq!(arrival(&at(500.0), 400.0, false).unwrap(), None);
     }
 }
