@@ -10,8 +10,9 @@ use crate::quantity::rate;
 const ROWS: usize = 10;
 const NARROWEST: usize = 30;
 const WIDEST: usize = 100;
-/// Columns left of the curve: the axis and its rate.
-const GUTTER: usize = 12;
+/// Columns left of the curve: the longest rate, such as `123 events/s`, a space and the axis.
+const GUTTER: usize = LABEL + 2;
+const LABEL: usize = 12;
 const BLOCKS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// What is drawn at one moment. Positions in lens counts, rates in events per second.
@@ -69,9 +70,9 @@ impl CurveView {
         for row in (0..ROWS).rev() {
             let label = if row + 1 == ROWS && highest > 0.0 { rate(highest) } else { String::new() };
             let bars: String = columns.iter().map(|&rate| block(rate, highest, row)).collect();
-            lines.push(format!("{label:>width$} ┤{bars}", width = GUTTER - 2).trim_end().to_owned());
+            lines.push(format!("{label:>LABEL$} ┤{bars}").trim_end().to_owned());
         }
-        lines.push(format!("{:>width$} └{}", "", "─".repeat(self.columns), width = GUTTER - 2));
+        lines.push(format!("{:>LABEL$} └{}", "", "─".repeat(self.columns)));
         lines.push(self.foot(frame.lens));
         lines
     }
@@ -142,6 +143,18 @@ mod tests {
         assert!(lines[1].contains("48 events/s") && lines[1].ends_with('█'), "{}", lines[1]);
         assert!(lines[ROWS].chars().count() < GUTTER + 27, "{}", lines[ROWS]);
         assert!(lines[ROWS + 2].contains('▲') && lines[ROWS + 2].ends_with("100 counts"));
+    }
+
+    #[test]
+    fn all_rows_begin_at_the_axis_however_long_the_rate_is() {
+        let view = CurveView::with_columns(0.0, 100.0, 50);
+        for highest in [3.0, 48.0, 999.4, 999.9, 960_300.0, 999_960.0, 3.2e6, 123.4e6] {
+            let lines = view.lines(CurveFrame { points: &[(50.0, highest)], lens: None, title: "t" });
+            for line in &lines[1..=ROWS + 1] {
+                let axis = line.chars().position(|letter| "┤└".contains(letter));
+                assert_eq!(axis, Some(GUTTER - 1), "{line}");
+            }
+        }
     }
 
     #[test]

@@ -13,11 +13,11 @@ pub(crate) fn count(number: u64) -> String {
     text
 }
 
-/// An event rate: 12 events/s, 3.4 kev/s, 1.2 Mev/s.
+/// An event rate, by the unit that leaves at most three digits before the point: 12 events/s, 3.4 kev/s, 1.2 Mev/s.
 pub(crate) fn rate(per_second: f64) -> String {
-    if per_second >= 1e6 {
+    if per_second >= 999_950.0 {
         format!("{:.2} Mev/s", per_second * 1e-6)
-    } else if per_second >= 1e3 {
+    } else if per_second >= 999.5 {
         format!("{:.1} kev/s", per_second * 1e-3)
     } else {
         format!("{per_second:.0} events/s")
@@ -27,6 +27,18 @@ pub(crate) fn rate(per_second: f64) -> String {
 /// Camera time in seconds.
 pub(crate) fn seconds(micros: f64) -> String {
     format!("{:.3} s", micros * 1e-6)
+}
+
+/// Half the difference of the two directions' answers, from the time that `delay_us` says and the speed in counts per
+/// second if it is known. Only for methods without a bias of their own is it a delay, so it is not called one.
+pub(crate) fn half_difference(delay_us: f64, speed: Option<f64>) -> String {
+    let time = format!("{:.2} ms", delay_us * 1e-3);
+    match speed {
+        Some(speed) => {
+            format!("half the difference of the directions  {:.1} counts ({time})", delay_us * 1e-6 * speed)
+        }
+        None => format!("half the difference of the directions  {time}"),
+    }
 }
 
 #[cfg(test)]
@@ -41,8 +53,18 @@ mod tests {
     }
 
     #[test]
+    fn a_difference_is_told_in_counts_first() {
+        let text = half_difference(-72_940.0, Some(1765.0));
+        assert_eq!(text, "half the difference of the directions  -128.7 counts (-72.94 ms)");
+        assert!(half_difference(5e3, None).ends_with("  5.00 ms"));
+    }
+
+    #[test]
     fn rates_have_three_digits_or_so() {
         assert_eq!(rate(12.3), "12 events/s");
+        assert_eq!(rate(999.4), "999 events/s");
+        assert_eq!(rate(999.6), "1.0 kev/s");
+        assert_eq!(rate(999_960.0), "1.00 Mev/s");
         assert_eq!(rate(3_400.0), "3.4 kev/s");
         assert_eq!(rate(1_234_567.0), "1.23 Mev/s");
     }
