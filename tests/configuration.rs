@@ -66,13 +66,33 @@ fn mistakes_are_named_with_key_value_and_remedy() {
     refused("[lens]\nmax_counts = 9999", &["lens.max_counts", "9999", "3750"]);
     refused("[simulation]\nscene = \"cat\"", &["simulation.scene", "cat", "dead-leaves"]);
     refused("[simulation]\nlight = \"dim\"", &["simulation.light", "dim", "dark"]);
-    refused("[simulation]\nfocus_counts = 99999", &["focus", "99999", "3750"]);
+    refused("[simulation]\nfocus_counts = 99999", &["line 2", "simulation.focus_counts", "99999", "3750"]);
     refused("[[simulation.faults]]\nkind = \"gremlin\"\nafter_ms = 1", &["gremlin", "lens-stalled"]);
     refused("[[simulation.faults]]\nkind = \"lens-stalled\"", &["lens-stalled", "after_ms"]);
     refused("[daemon]\nmode = \"continuous\"", &["daemon.mode", "continuous", "manual"]);
     refused("[daemon]\nreports_kept = 0", &["daemon.reports_kept", "0", "1"]);
     refused("[daemon\n", &["line 1"]);
     refused("[serial]\nport = 1", &["serial"]);
+    refused(
+        "[focus]\nposition_tolerance_counts = 3000",
+        &["line 2", "focus.position_tolerance_counts", "3000", "176.5"],
+    );
+    refused("[focus]\napproach_margin_counts = 0", &["focus.approach_margin_counts", "0", "21.18"]);
+    refused("[focus]\nlongest_sweep_s = 0.5", &["line 2", "focus.longest_sweep_s", "2.0 s"]);
+    refused("[focus]\n\nmethod = \"er-fixed\"\ninterval_ms = 5000", &["line 4", "focus.interval_ms", "5 s"]);
+    refused("[focus]\nbin_us = 1.5", &["bin_us", "line 2"]);
+    refused(
+        "[focus]\nbin_us = 1\nlongest_sweep_s = 120\nevents_kept = 999999999",
+        &["focus.events_kept", "GB"],
+    );
+    refused("[simulation]\nflicker_hz = -100", &["line 2", "simulation.flicker_hz", "-100"]);
+    refused("[simulation]\nflicker_depth = 7", &["simulation.flicker_depth", "7"]);
+    refused("[simulation]\nshake_px_rms = -2", &["line 2", "simulation.shake_px_rms", "-2"]);
+    refused(
+        "[[simulation.faults]]\nkind = \"lens-silent\"\nafter_ms = 1\nshare = 0.5",
+        &["simulation.faults.share", "lens-silent", "event-loss"],
+    );
+    refused("[daemon]\nsocket = \"\"", &["line 2", "daemon.socket"]);
 }
 
 #[test]

@@ -187,6 +187,22 @@ fn abort_leaves_the_lens_where_it_is() -> Result<()> {
     assert_eq!(rig.controller().snapshot().state, FocusState::Idle);
     let report = rig.controller().report().context("a report")?;
     assert_eq!(report.outcome, Outcome::Aborted);
+    let leg = report.sweeps().next().context("the unfinished sweep")?;
+    assert!(leg.on + leg.off > 10_000, "what was counted is in the report: {} events", leg.on + leg.off);
+    assert!(!leg.curve.points().is_empty());
+    Ok(())
+}
+
+#[test]
+fn a_lens_is_homed_before_its_first_run_and_not_moved_before() -> Result<()> {
+    let homing = config("[simulation]\nlens_needs_homing = true")?;
+    let mut rig = VirtualRig::new(&homing)?;
+    assert!(matches!(rig.command(Command::MoveTo(LensPosition(500.0))), Err(Refusal::NotHomed)));
+    let report = rig.focus(FocusRequest::default(), |_, _, _| {})?;
+    assert!(error_of(&rig, &report)?.abs() < 60.0);
+    assert!(!report.phases[Phase::Homing as usize].is_zero());
+    let again = rig.focus(FocusRequest::default(), |_, _, _| {})?;
+    assert!(again.phases[Phase::Homing as usize].is_zero(), "once is enough");
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use crate::lens_trace::LensTrace;
 use crate::quality::SweepQuality;
 use crate::report::{Failure, LegReport};
 use crate::search::{Method, Searcher};
-use crate::sweep::SweepRecorder;
+use crate::sweep::{Sweep, SweepRecorder};
 use crate::units::{CameraMicros, EventRate};
 
 /// What a sweep must hold to be believed.
@@ -52,21 +52,13 @@ impl Analyzer {
         limits: SweepLimits,
         report: &mut LegReport,
     ) -> Result<(), Failure> {
-        (report.on, report.off) = recorder.counter().totals();
-        report.not_kept = recorder.store().not_kept();
+        let sweep = describe(recorder, trace, report);
         let counted = report.on + report.off;
         let too_few = Failure::TooFewEvents { events: counted, needed: limits.fewest_events };
         if counted < limits.fewest_events {
             return Err(too_few);
         }
-        let sweep = recorder.sweep(trace).ok_or(too_few)?;
-        (report.start, report.end) = (sweep.start, sweep.end);
-        if let (Some((_, from)), Some((_, to))) = (trace.first(), trace.last()) {
-            (report.from, report.to) = (from, to);
-        }
-        report.curve.fill(&sweep);
-        report.peak_rate =
-            EventRate(report.curve.points().iter().map(|point| point.rate.0).fold(0.0, f64::max));
+        let sweep = sweep.ok_or(too_few)?;
         let quality = SweepQuality::of(&sweep).map_err(|error| Failure::NoAnswer(error.into()))?;
         report.quality = quality;
         for other in Method::ALL {
@@ -96,4 +88,23 @@ impl Analyzer {
             Some(Ok(_)) | None => Ok(()),
         }
     }
+}
+
+/// Writes what `recorder` counted into `report`, and the focus curve as far as there is one. Returns the sweep, if it has events
+/// at known lens positions.
+pub(crate) fn describe<'a>(
+    recorder: &'a SweepRecorder,
+    trace: &'a LensTrace<CameraMicros>,
+    report: &mut LegReport,
+) -> Option<Sweep<'a>> {
+    (report.on, report.off) = recorder.counter().totals();
+    report.not_kept = recorder.store().not_kept();
+    if let (Some((_, from)), Some((_, to))) = (trace.first(), trace.last()) {
+        (report.from, report.to) = (from, to);
+    }
+    let sweep = recorder.sweep(trace)?;
+    (report.start, report.end) = (sweep.start, sweep.end);
+    report.curve.fill(&sweep);
+    report.peak_rate = EventRate(report.curve.points().iter().map(|point| point.rate.0).fold(0.0, f64::max));
+    Some(sweep)
 }

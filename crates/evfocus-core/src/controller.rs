@@ -188,7 +188,9 @@ impl Controller {
             Command::MoveTo(target) => self.move_to(target, now, actions),
             Command::SetMode(mode) => {
                 if mode != self.mode {
-                    self.abort(now, actions);
+                    if self.state != State::Idle {
+                        self.abort(now, actions);
+                    }
                     self.mode = mode;
                     self.outcome = FocusState::Idle;
                 }
@@ -251,18 +253,20 @@ impl Controller {
         if !self.lens_ready || self.lens.is_none() {
             return Err(Refusal::NoLens);
         }
+        if !self.homed {
+            return Err(Refusal::NotHomed);
+        }
         let motion = self.start_motion(target, self.config.max_speed, now, actions);
         self.outcome = FocusState::Idle;
         self.enter(State::Moving(motion), now);
         Ok(Accepted::Done)
     }
 
+    /// Stops the lens whatever is under way: it may be moving without the controller's knowledge.
     fn abort(&mut self, now: HostMicros, actions: &mut Vec<Action>) {
-        if self.state == State::Idle {
-            return;
-        }
         actions.push(Action::StopLens);
         if self.run.is_some() {
+            self.keep_unfinished_sweep();
             self.finish(Outcome::Aborted, now, actions);
         } else {
             self.enter(State::Idle, now);
@@ -362,6 +366,10 @@ impl Controller {
                     self.state = State::Homing { since, seen_moving: true };
                 } else if seen_moving || now.since(since) >= HOMING_BEGINS {
                     self.homed = true;
+                    if let Some(run) = &mut self.run {
+                        // Positions mean something only now.
+                        run.position_before = sample.position;
+                    }
                     self.go_to_start(now, actions);
                 }
             }

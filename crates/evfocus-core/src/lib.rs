@@ -10,6 +10,7 @@ extern crate alloc;
 extern crate std;
 
 mod analysis;
+mod answer;
 mod clock_map;
 pub mod controller;
 mod counter;
@@ -26,6 +27,7 @@ mod sweep;
 mod units;
 
 pub use analysis::{Analyzer, SweepLimits};
+pub use answer::{Combined, combine, is_at_edge};
 pub use clock_map::{ClockEvent, ClockMap, ClockMapQuality, NoClockYet};
 pub use controller::{Controller, ControllerConfig};
 pub use counter::{CounterError, CumulativeCounter, EventCounts};

@@ -156,7 +156,7 @@ pub enum Failure {
     CameraSilent,
     /// Camera time cannot be related to lens positions: the camera's clock started anew, or arrival times scatter too much.
     ClockUnusable,
-    /// The sweep was longer than the daemon keeps counts or positions for.
+    /// The sweep was longer than counts are kept for.
     SweepTooLong,
     /// A phase took longer than it may.
     TimedOut(Phase),
@@ -236,19 +236,23 @@ impl fmt::Display for Failure {
             }
             Self::LensStoppedShort => f.write_str("the lens stopped before its target: check for an obstacle"),
             Self::LensOvershoot => f.write_str("the lens came to rest beyond its target: lower its speed"),
-            Self::LensLost => f.write_str("the lens is gone: check its cable"),
+            Self::LensLost => f.write_str("the lens is gone: check its cable, then restart evfocusd"),
             Self::LensFault => f.write_str("the lens reports a fault; the log has its words"),
             Self::LensSilent => f.write_str("the lens does not answer: check its cable and power"),
-            Self::CameraLost => f.write_str("the camera is gone: check its cable"),
+            Self::CameraLost => f.write_str("the camera is gone: check its cable, then restart evfocusd"),
             Self::CameraFault => f.write_str("the camera reports a fault; the log has its words"),
             Self::CameraSilent => f.write_str("the camera sends nothing, not even time: plug it in anew"),
             Self::ClockUnusable => f.write_str(
                 "camera time cannot be related to lens positions: the camera's clock jumped, or the host was too busy",
             ),
             Self::SweepTooLong => {
-                f.write_str("the sweep took longer than counts are kept for: sweep faster or raise sweep.longest_s")
+                f.write_str("the sweep took longer than counts are kept for: sweep faster or raise focus.longest_sweep_s")
             }
-            Self::TimedOut(phase) => write!(f, "{} took longer than it may", phase.name()),
+            Self::TimedOut(phase) => write!(
+                f,
+                "{} took longer than it may: check that the lens moves freely and that the host keeps up with the camera",
+                phase.name()
+            ),
         }
     }
 }

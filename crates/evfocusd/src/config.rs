@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use evfocus_core::LensPosition;
-use evfocus_core::controller::Mode;
+use evfocus_core::controller::{FocusRequest, Mode, Refusal};
 use serde::Deserialize;
 
 pub use focus::FocusSection;
@@ -110,26 +110,28 @@ pub struct Config {
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("cannot read the configuration {}: {source}", path.display())]
+    #[error("cannot read the configuration {}: {cause}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The file is not the TOML that is expected; the parser's words name line, column and key.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Syntax {
         /// The file.
         path: PathBuf,
         /// Line, column, key.
-        source: Box<toml::de::Error>,
+        cause: Box<toml::de::Error>,
     },
     /// A value that makes no sense.
-    #[error("{}: {key} is {value}: {remedy}", path.display())]
+    #[error("{}{}: {key} is {value}: {remedy}", path.display(), line.map(|line| format!(", line {line}")).unwrap_or_default())]
     Value {
         /// The file.
         path: PathBuf,
+        /// The line that sets the key, from 1; absent for a key that the file leaves out.
+        line: Option<usize>,
         /// The key with its section.
         key: String,
         /// The value given.
@@ -184,7 +186,7 @@ impl Config {
     /// [`ConfigError`], naming the file, the key, the value and what it must be.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
-            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+            .map_err(|cause| ConfigError::Read { path: path.to_owned(), cause })?;
         Self::parse(&text, path)
     }
 
@@ -194,9 +196,10 @@ impl Config {
     /// As [`read`](Self::read).
     pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
         let file: ConfigFile = toml::from_str(text)
-            .map_err(|source| ConfigError::Syntax { path: path.to_owned(), source: Box::new(source) })?;
+            .map_err(|cause| ConfigError::Syntax { path: path.to_owned(), cause: Box::new(cause) })?;
         Self::check(file).map_err(|bad| ConfigError::Value {
             path: path.to_owned(),
+            line: line_of(text, &bad.key),
             key: bad.key,
             value: bad.value,
             remedy: bad.remedy,
@@ -240,6 +243,13 @@ impl Config {
                 format!("it must lie below lens.max_counts, {max}"),
             ));
         }
+        for (key, path) in
+            [("daemon.socket", &file.daemon.socket), ("daemon.state_dir", &file.daemon.state_dir)]
+        {
+            if path.as_ref().is_some_and(|path| path.as_os_str().is_empty()) {
+                return Err(BadValue::new(key, "empty", "give a path, or leave the key out for the default"));
+            }
+        }
         let config = Self {
             socket: file.daemon.socket.unwrap_or_else(default_socket),
             state_dir: file.daemon.state_dir.unwrap_or_else(default_state_dir),
@@ -251,8 +261,13 @@ impl Config {
             rig: file.simulation.rig()?,
             focus: file.focus,
         };
-        // Against the simulated lens now rather than at the first run.
-        config.controller(&hil_sim_lens(&config.rig))?;
+        // Against the simulated lens, and the default run against both, now rather than at the first run.
+        let controller = config.controller(&hil_sim_lens(&config.rig))?;
+        FocusRequest::default().resolve(&controller).map_err(|refusal| {
+            let is_interval = matches!(refusal, Refusal::Interval { .. });
+            let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
+            BadValue::new(key, "not fit for a default run", refusal.to_string())
+        })?;
         Ok(config)
     }
 
@@ -261,8 +276,26 @@ impl Config {
         &self,
         lens: &evfocus_hal::LensInfo,
     ) -> Result<evfocus_core::ControllerConfig, BadValue> {
-        self.focus.controller(lens, self.lens_min, self.lens_max)
+        let mut controller = self.focus.controller(lens, self.lens_min, self.lens_max)?;
+        // Room for a position at every poll of the longest sweep, and for the rests around it.
+        let polls = controller.capacity.longest.as_secs_f64() / self.lens_poll.as_secs_f64();
+        controller.lens_samples = polls as usize * 2 + 1_000;
+        Ok(controller)
     }
+}
+
+/// The line, from 1, on which `key` (section and name) is set in `text`; nothing if it is not.
+fn line_of(text: &str, key: &str) -> Option<usize> {
+    let (section, name) = key.rsplit_once('.')?;
+    let mut here = "";
+    text.lines().enumerate().find_map(|(index, line)| {
+        let line = line.trim();
+        if line.starts_with('[') {
+            here = line.trim_start_matches('[').split(']').next().unwrap_or_default().trim();
+        }
+        let (left, _) = line.split_once('=')?;
+        (here == section && left.trim() == name).then_some(index + 1)
+    })
 }
 
 fn hil_sim_lens(rig: &hil_sim::RigConfig) -> evfocus_hal::LensInfo {

@@ -49,6 +49,11 @@ pub async fn run(
         .with_context(|| format!("cannot listen on {}", config.socket.display()))?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
     let devices = Devices::open(&config, &clock)?;
+    if config.rig.sensor.geometry.pixels() > 200_000 {
+        tracing::warn!(
+            "the simulated IMX636 is several times slower than real time, so runs will time out; use davis346 here"
+        );
+    }
     let mut running = Running::start(&config, devices, &clock)?;
     let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());
     running.wait_for_the_lens().await;
@@ -157,8 +162,12 @@ impl Running {
             lens: devices::name(&lens_info.model, &lens_info.serial),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
-        let lookups =
-            DaemonLookups { camera: camera_info, lens: lens_info, reports: store.clone(), status: status_out.clone() };
+        let lookups = DaemonLookups {
+            camera: camera_info,
+            lens: lens_info,
+            reports: store.clone(),
+            status: status_out.clone(),
+        };
         let followers = progress_in.downgrade();
         let publisher = Publisher {
             snapshots: snapshots_out,
@@ -207,7 +216,10 @@ impl Running {
             }
         }
         if !hung.is_empty() {
-            bail!("still busy {STOP_TIME:?} after they were told to stop: {}; the lens may be moving", hung.join(", "));
+            bail!(
+                "still busy {STOP_TIME:?} after they were told to stop: {}; the lens may be moving",
+                hung.join(", ")
+            );
         }
         if !panicked.is_empty() {
             bail!("panicked: {}; the lens is stopped; the log says where", panicked.join(", "));

@@ -8,7 +8,10 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 /// Starts to log. `EVFOCUS_LOG` sets levels (`debug`, `evfocusd=trace`); default `info`.
 pub fn start() {
-    let filter = EnvFilter::try_from_env("EVFOCUS_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let wanted = std::env::var("EVFOCUS_LOG").unwrap_or_else(|_| "info".to_owned());
+    let parsed = EnvFilter::try_new(&wanted);
+    let mistake = parsed.as_ref().err().map(ToString::to_string);
+    let filter = parsed.unwrap_or_else(|_| EnvFilter::new("info"));
     let registry = tracing_subscriber::registry().with(filter);
     // systemd sets JOURNAL_STREAM where standard error is the journal: then fields go there as fields.
     let journal = std::env::var_os("JOURNAL_STREAM").and_then(|_| tracing_journald::layer().ok());
@@ -19,5 +22,8 @@ pub fn start() {
         registry
             .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_ansi(terminal))
             .init();
+    }
+    if let Some(error) = mistake {
+        tracing::warn!(EVFOCUS_LOG = %wanted, %error, "not a log filter, so info is used; try debug or evfocusd=trace");
     }
 }

@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use evfocus_ipc::{Error, Report};
 
@@ -14,6 +15,8 @@ const SUFFIX: &str = ".json";
 pub(crate) struct ReportStore {
     directory: PathBuf,
     kept: usize,
+    /// Held while the store lives, so that no other daemon numbers its runs in the same directory.
+    _lock: Arc<File>,
 }
 
 impl ReportStore {
@@ -22,9 +25,17 @@ impl ReportStore {
     /// # Errors
     /// [`Error::StorageFailed`], naming the directory and the remedy.
     pub(crate) fn open(state_dir: &Path, kept: usize) -> Result<Self, Error> {
-        let store = Self { directory: state_dir.join("reports"), kept: kept.max(1) };
-        fs::create_dir_all(&store.directory).map_err(|error| failed(&store.directory, &error))?;
-        Ok(store)
+        let directory = state_dir.join("reports");
+        fs::create_dir_all(&directory).map_err(|error| failed(&directory, &error))?;
+        let lock = File::open(&directory).map_err(|error| failed(&directory, &error))?;
+        rustix::fs::flock(&lock, rustix::fs::FlockOperation::NonBlockingLockExclusive).map_err(|_| {
+            Error::StorageFailed {
+                path: directory.display().to_string(),
+                message: "another evfocusd writes its reports there; name another directory with --state-dir"
+                    .to_owned(),
+            }
+        })?;
+        Ok(Self { directory, kept: kept.max(1), _lock: Arc::new(lock) })
     }
 
     fn path(&self, id: u64) -> PathBuf {

@@ -71,6 +71,10 @@ pub(crate) fn refusal(refusal: &Refusal) -> ipc::Error {
             role: ipc::DeviceRole::Lens,
             remedy: "connect the lens; ListDevices says what is there".to_owned(),
         },
+        Refusal::NotHomed => ipc::Error::NotPermitted {
+            what: "moving a lens that has not been homed".to_owned(),
+            remedy: "start a focus run; it homes the lens first".to_owned(),
+        },
         Refusal::OutOfRange { what, value, limits } => {
             ipc::Error::OutOfRange { what: what.to_owned(), value, min: limits.min().0, max: limits.max().0 }
         }

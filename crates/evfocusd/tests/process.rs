@@ -215,6 +215,62 @@ fn a_state_directory_that_may_not_be_written_is_named_with_the_remedy() -> Resul
 }
 
 #[test]
+fn many_moves_at_once_cost_neither_the_lens_nor_the_stop() -> Result<()> {
+    let daemon = Daemon::start()?;
+    block_on(async {
+        let mut clients = Vec::new();
+        for _ in 0..50 {
+            clients.push(Client::connect(&daemon.socket()).await?);
+        }
+        let mut moves = tokio::task::JoinSet::new();
+        for (index, mut client) in clients.into_iter().enumerate() {
+            moves.spawn(async move { client.move_to(1000.0 + index as f64 * 10.0).await });
+        }
+        while let Some(moved) = moves.join_next().await {
+            moved??;
+        }
+        let mut client = Client::connect(&daemon.socket()).await?;
+        client.abort().await?;
+        let report = Client::connect(&daemon.socket()).await?.focus_and_wait(&short()).await?;
+        assert_eq!(report.result.state, State::Focused, "{}", report.result.message);
+        Ok(())
+    })
+}
+
+#[test]
+fn two_daemons_do_not_share_a_state_directory() -> Result<()> {
+    let first = Daemon::start()?;
+    let folder = tempfile::tempdir()?;
+    symlink(first.path("state"), folder.path().join("state"))?;
+    let second = Daemon::start_in(folder)?;
+    block_on(async {
+        let fault = Client::connect(&second.socket()).await?.status().await?.fault.context("a fault")?;
+        assert!(fault.contains("another evfocusd") && fault.contains("--state-dir"), "{fault}");
+        assert_eq!(Client::connect(&first.socket()).await?.status().await?.fault, None);
+        Ok(())
+    })
+}
+
+#[test]
+fn a_run_aborted_at_once_has_its_date() -> Result<()> {
+    let daemon = Daemon::start()?;
+    block_on(async {
+        let mut run = Client::connect(&daemon.socket()).await?.focus(&short()).await?;
+        let mut aborted = false;
+        while let Some(news) = run.next().await? {
+            if let Some(report) = news.report {
+                assert!(report.started_unix_s > 1.7e9, "{}", report.started_unix_s);
+                return Ok(());
+            }
+            if !std::mem::replace(&mut aborted, true) {
+                Client::connect(&daemon.socket()).await?.abort().await?;
+            }
+        }
+        bail!("no report")
+    })
+}
+
+#[test]
 fn a_socket_in_use_is_refused_and_its_owner_lives() -> Result<()> {
     let daemon = Daemon::start()?;
     let socket = daemon.socket();

@@ -73,6 +73,9 @@ pub enum Refusal {
     /// There is no lens.
     #[error("no lens is connected")]
     NoLens,
+    /// The lens has not found its reference yet, so a position means nothing.
+    #[error("the lens has not been homed; a focus run homes it first")]
+    NotHomed,
     /// A position outside of the limits.
     #[error("{what} {value} lies outside of the lens's limits, {limits}")]
     OutOfRange {

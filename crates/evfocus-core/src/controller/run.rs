@@ -5,6 +5,7 @@ use core::time::Duration;
 
 use super::motion::Motion;
 use super::{APPROACHES, Action, Controller, FocusState, OnFailure, State};
+use crate::answer::{combine, is_at_edge};
 use crate::lens_trace::LensSample;
 use crate::report::{Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport};
 use crate::units::{HostMicros, LensPosition, LensSpeed};
@@ -18,7 +19,7 @@ pub(super) struct Run {
     pub(super) id: RunId,
     pub(super) plan: FocusPlan,
     started: HostMicros,
-    position_before: LensPosition,
+    pub(super) position_before: LensPosition,
     pub(super) legs: [Option<LegReport>; 2],
     /// Reports waiting for their sweep, so that none is allocated between its start and its result.
     spare: [Option<LegReport>; 2],
@@ -67,13 +68,9 @@ impl Run {
         };
         let forward = estimate_of(first)?;
         let Some(second) = second else { return Ok(forward) };
-        let backward = estimate_of(second)?;
-        let half = forward.counts_from(backward) / 2.0;
-        if libm::fabs(half) > largest_mismatch_share * self.plan.range.length() {
-            return Err(Failure::DirectionMismatch { forward, backward });
-        }
-        self.delay_us = Some(half / self.plan.speed.counts_per_second() * 1e6);
-        Ok(LensPosition(f64::midpoint(forward.0, backward.0)))
+        let combined = combine(forward, estimate_of(second)?, self.plan.range, largest_mismatch_share)?;
+        self.delay_us = Some(combined.half_difference / self.plan.speed.counts_per_second() * 1e6);
+        Ok(combined.position)
     }
 }
 
@@ -161,14 +158,24 @@ impl Controller {
         match run.answer(self.config.largest_mismatch_share) {
             Err(failure) => self.fail(failure, now, actions),
             Ok(answer) => {
-                let edge = self.config.edge_share * range.length();
-                let to_edge = answer.distance(range.min()).min(answer.distance(range.max()));
-                if to_edge < edge || !range.contains(answer) {
+                if is_at_edge(answer, range, self.config.edge_share) {
                     self.fail(Failure::PeakAtEdge { position: answer }, now, actions);
                 } else {
                     self.approach(answer, 1, now, actions);
                 }
             }
+        }
+    }
+
+    /// A sweep that ends before its time leaves what it has counted in the report.
+    pub(super) fn keep_unfinished_sweep(&mut self) {
+        let (State::Sweeping { leg, .. } | State::Draining { leg, .. }) = self.state else { return };
+        let Some(run) = &mut self.run else { return };
+        if let (Some(mut report), Some(place)) =
+            (run.spare.get_mut(leg).and_then(Option::take), run.legs.get_mut(leg))
+        {
+            self.sweep.report_unfinished(&self.clock, &mut report);
+            *place = Some(report);
         }
     }
 
@@ -226,7 +233,6 @@ impl Controller {
 
     pub(super) fn give_up_motion(&mut self, now: HostMicros, actions: &mut Vec<Action>) {
         actions.push(Action::StopLens);
-        self.outcome = FocusState::Failed;
         self.enter(State::Idle, now);
     }
 
@@ -241,10 +247,12 @@ impl Controller {
             }
             return;
         }
+        self.keep_unfinished_sweep();
         let go_back = self.config.on_failure == OnFailure::Restore
             && !failure.is_of_lens()
             && !matches!(failure, Failure::TimedOut(_))
             && self.lens_ready
+            && self.homed
             && self.config.limits.contains(before);
         if go_back {
             let motion = self.start_motion(before, self.config.max_speed, now, actions);

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use super::ControllerConfig;
-use crate::analysis::Analyzer;
+use crate::analysis::{Analyzer, describe};
 use crate::clock_map::ClockMap;
 use crate::curve::CurvePoint;
 use crate::event::{Event, EventBatch, Geometry};
@@ -148,12 +148,7 @@ impl SweepState {
         clock: &ClockMap,
         report: &mut LegReport,
     ) -> Result<(), Failure> {
-        self.camera_trace.clear();
-        for (host, position) in self.host_trace.samples() {
-            if let Ok(camera) = clock.to_camera(host) {
-                self.camera_trace.push_if_later(camera, position);
-            }
-        }
+        self.align(clock);
         report.lost = self.lost;
         self.analyzer.analyze(
             &self.recorder,
@@ -163,5 +158,21 @@ impl SweepState {
             config.sweep_limits,
             report,
         )
+    }
+    /// Writes what has been counted of a sweep that is not searched into `report`.
+    pub(super) fn report_unfinished(&mut self, clock: &ClockMap, report: &mut LegReport) {
+        self.align(clock);
+        report.lost = self.lost;
+        describe(&self.recorder, &self.camera_trace, report);
+    }
+
+    /// Brings the lens positions into camera time.
+    fn align(&mut self, clock: &ClockMap) {
+        self.camera_trace.clear();
+        for (host, position) in self.host_trace.samples() {
+            if let Ok(camera) = clock.to_camera(host) {
+                self.camera_trace.push_if_later(camera, position);
+            }
+        }
     }
 }

@@ -7,6 +7,9 @@ use serde::Deserialize;
 
 use super::BadValue;
 
+/// Most memory that counts and events of a sweep may take.
+const MOST_BYTES: f64 = 4e9;
+
 /// `[focus]`. Absent keys take the lens's own figures or the defaults of
 /// [`ControllerConfig::for_lens`].
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -37,7 +40,7 @@ pub struct FocusSection {
     /// How long homing may take, seconds; 1 to 600, default 30.
     pub homing_timeout_s: Option<f64>,
     /// Width of the counter's bins, microseconds; 1 to 1000, default 20.
-    pub bin_us: Option<f64>,
+    pub bin_us: Option<u32>,
     /// The longest sweep, seconds; 0.1 to 120, default 20. Memory: 16 bytes a bin.
     pub longest_sweep_s: Option<f64>,
     /// Events kept for the measures that need pixels; default 16,000,000, 8 bytes each.
@@ -46,6 +49,11 @@ pub struct FocusSection {
     pub fewest_events: Option<u32>,
     /// The largest share of events that may be lost, 0 to 1; default 0.05.
     pub largest_lost_share: Option<f64>,
+    /// The largest share of events that may follow the mains, 0 to 2; default 0.6.
+    pub largest_flicker_depth: Option<f64>,
+    /// The largest error, root mean square, with which camera and host time may be related, milliseconds; 0.01 to 1000, default
+    /// 20.
+    pub largest_clock_residual_ms: Option<f64>,
     /// The largest half-difference of the two directions as a share of the range, 0 to 1; default 0.15.
     pub largest_mismatch_share: Option<f64>,
     /// An answer this near to an end of the range, as a share of it, means that focus lies beyond; 0 to 0.4, default 0.02.
@@ -122,14 +130,15 @@ impl FocusSection {
             &mut config.position_tolerance,
             "focus.position_tolerance_counts",
             self.position_tolerance_counts,
-            0.0,
-            length,
+            f64::MIN_POSITIVE,
+            0.05 * length,
         )?;
         set(
             &mut config.approach_margin,
             "focus.approach_margin_counts",
             self.approach_margin_counts,
-            0.0,
+            // Nearer than that, the lens would count as arrived before it has set out.
+            2.0 * config.position_tolerance,
             length,
         )?;
         let milliseconds = 1e-3;
@@ -167,18 +176,34 @@ impl FocusSection {
     fn sweep(&self, config: &mut ControllerConfig) -> Result<(), BadValue> {
         set_duration(&mut config.interval, "focus.interval_ms", self.interval_ms, 1e-3, (1.0, 1e4))?;
         let SweepCapacity { bin, longest, events } = &mut config.capacity;
-        set_duration(bin, "focus.bin_us", self.bin_us, 1e-6, (1.0, 1000.0))?;
+        set_duration(bin, "focus.bin_us", self.bin_us.map(f64::from), 1e-6, (1.0, 1000.0))?;
         set_duration(longest, "focus.longest_sweep_s", self.longest_sweep_s, 1.0, (0.1, 120.0))?;
         if let Some(kept) = self.events_kept {
             BadValue::check("focus.events_kept", f64::from(kept), 0.0, 1e9)?;
             *events = kept as usize;
         }
-        let SweepLimits { fewest_events, largest_lost_share, largest_flicker_depth: _ } =
+        let bytes = 16.0 * longest.as_secs_f64() / bin.as_secs_f64() + 8.0 * *events as f64;
+        if bytes > MOST_BYTES {
+            let remedy = format!(
+                "counts and events would take {:.1} GB, more than 4: keep fewer, or sweep shorter",
+                bytes * 1e-9
+            );
+            return Err(BadValue::new("focus.events_kept", *events, remedy));
+        }
+        let SweepLimits { fewest_events, largest_lost_share, largest_flicker_depth } =
             &mut config.sweep_limits;
         if let Some(fewest) = self.fewest_events {
             *fewest_events = u64::from(fewest);
         }
         set(largest_lost_share, "focus.largest_lost_share", self.largest_lost_share, 0.0, 1.0)?;
+        set(largest_flicker_depth, "focus.largest_flicker_depth", self.largest_flicker_depth, 0.0, 2.0)?;
+        set_duration(
+            &mut config.largest_clock_residual,
+            "focus.largest_clock_residual_ms",
+            self.largest_clock_residual_ms,
+            1e-3,
+            (0.01, 1000.0),
+        )?;
         set(
             &mut config.largest_mismatch_share,
             "focus.largest_mismatch_share",

@@ -37,6 +37,8 @@ pub struct SimulationSection {
     pub flicker_depth: f64,
     /// `good` or `worn` (backlash, overshoot, ripple, noise, lag).
     pub lens: String,
+    /// Whether the lens must be homed before it moves.
+    pub lens_needs_homing: bool,
     /// Number of hot pixels.
     pub hot_pixels: u32,
     /// Every random choice follows from it.
@@ -60,6 +62,7 @@ impl Default for SimulationSection {
             flicker_hz: 0.0,
             flicker_depth: 0.1,
             lens: "good".to_owned(),
+            lens_needs_homing: false,
             hot_pixels: 0,
             seed: rig.seed,
             faults: Vec::new(),
@@ -111,6 +114,9 @@ impl SimulationSection {
             vibration_px_rms: self.vibration_px_rms,
             velocity_px_per_s: (self.velocity_px_per_s, 0.0),
         };
+        BadValue::check("simulation.flicker_hz", self.flicker_hz, 0.0, 500.0)?;
+        BadValue::check("simulation.flicker_depth", self.flicker_depth, 0.0, 1.0)?;
+        rig.lens.needs_homing = self.lens_needs_homing;
         if self.flicker_hz > 0.0 {
             rig.flicker = Some(Flicker { hertz: self.flicker_hz, depth: self.flicker_depth });
         }
@@ -118,14 +124,27 @@ impl SimulationSection {
         rig.seed = self.seed;
         rig.faults = self.faults.iter().map(FaultSection::fault).collect::<Result<_, _>>()?;
         rig.validate().map_err(|error| {
-            BadValue::new(
-                format!("simulation: {}", error.field),
-                error.value,
-                format!("it must be from {} to {}", error.min, error.max),
-            )
+            let (value, min, max) = (error.value, error.min, error.max);
+            BadValue::new(key_of(error.field), value, format!("it must be from {min} to {max}"))
         })?;
         Ok(rig)
     }
+}
+
+/// The key in the file behind a field of the simulator's configuration.
+fn key_of(field: &str) -> String {
+    let key = match field {
+        "focus" => "focus_counts",
+        "second_focus" => "second_focus_counts",
+        // The roll follows from the shake.
+        "motion.shake_px_rms" | "motion.roll_rad_rms" => "shake_px_rms",
+        "motion.vibration_px_rms" => "vibration_px_rms",
+        "motion.velocity_px_per_s.0" => "velocity_px_per_s",
+        "faults.share" => "faults.share",
+        "faults.position" => "faults.at_counts",
+        other => other,
+    };
+    format!("simulation.{key}")
 }
 
 impl FaultSection {
@@ -136,6 +155,9 @@ impl FaultSection {
                 self.duration_ms.ok_or_else(|| BadValue::new(key, &self.kind, "it needs duration_ms"))?;
             BadValue::duration("simulation.faults.duration_ms", value, 1e-3, 0.0, 1e6)
         };
+        if self.share.is_some() && self.kind != "event-loss" {
+            return Err(BadValue::new("simulation.faults.share", &self.kind, "only event-loss has a share"));
+        }
         let kind = match self.kind.as_str() {
             "camera-unplugged" => FaultKind::CameraUnplugged,
             "camera-time-reset" => FaultKind::CameraTimeReset,

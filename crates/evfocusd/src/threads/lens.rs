@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::thread::Thread;
 use std::time::Duration;
 
-use evfocus_core::{HostMicros, LensSample};
 use evfocus_core::controller::Action;
+use evfocus_core::{HostMicros, LensSample};
 use evfocus_hal::{Clock, DeviceError, Lens};
 use rtrb::Producer;
 
