@@ -3,6 +3,7 @@
 //! - [`cli`] is the command line itself; [`commands`] has one file for each subcommand.
 //! - [`arguments`] has what several of them take.
 //! - `recording` analyzes a sweep on disk with the daemon's own code; `simulation` makes one.
+//! - `files` looks at the files that are named; `output` is standard output.
 //! - `plot` draws focus curves as SVG, `curve_view` in a terminal.
 //!
 //! Not its job: focusing. The daemon does that, and [`evfocus_core`] knows how.
@@ -15,6 +16,7 @@ pub mod output;
 
 mod connection;
 mod curve_view;
+mod files;
 mod plot;
 mod quantity;
 mod recording;

@@ -15,6 +15,7 @@ use evfocus_core::{CameraMicros, Failure, LegReport, LensPosition, LensSpeed, Le
 use evfocus_ipc::Direction;
 use evfocus_record::{Format, Summary, positions};
 
+use crate::files::must_not_be_folder;
 pub(crate) use verdict::Verdict;
 
 /// What to analyze, and how.
@@ -64,6 +65,8 @@ pub(crate) struct RecordingAnalysis {
 
 /// Analyzes a recording: one pass to learn its size, one to count its events.
 pub(crate) fn analyze(request: &Request) -> anyhow::Result<RecordingAnalysis> {
+    must_not_be_folder(&request.recording, "recording")?;
+    must_not_be_folder(&request.positions, "positions")?;
     let summary = Summary::of_file(&request.recording, request.format)?;
     let trace = positions::read(&request.positions)?;
     let mut legs = legs::sweep_legs(&trace, &request.positions)?;
@@ -75,6 +78,7 @@ pub(crate) fn analyze(request: &Request) -> anyhow::Result<RecordingAnalysis> {
             .with_context(|| format!("{}: the size of the sensor is unknown", request.recording.display()))?;
         warnings.extend(coverage::check_recording(&legs.sweeps, &summary, recorded, &request.recording)?);
         legs.stretch_to(recorded);
+        legs.check_lengths(&request.positions)?;
         read::analyze_sweeps(request, geometry, summary.events, &legs.sweeps)?
     } else {
         Vec::new()

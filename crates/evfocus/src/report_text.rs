@@ -5,7 +5,7 @@ use std::io::Write;
 use evfocus_ipc::{Report, State};
 
 use crate::output::Output;
-use crate::quantity::{count, rate};
+use crate::quantity::{count, half_difference, rate};
 
 /// The outcome in one line, and what was odd.
 pub(crate) fn print_outcome(report: &Report, out: &mut Output) -> anyhow::Result<()> {
@@ -36,7 +36,7 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
         writeln!(out, "the lens stands at {position:.1} counts")?;
     }
     if let Some(delay_us) = report.delay_us {
-        writeln!(out, "delay {:.2} ms (half the difference of the two directions)", delay_us * 1e-3)?;
+        writeln!(out, "{}", half_difference(delay_us, report.request.speed_counts_per_s))?;
     }
     let events = &report.events;
     writeln!(

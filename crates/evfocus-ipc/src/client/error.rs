@@ -119,3 +119,21 @@ impl From<Refusal> for ClientError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_trouble_with_connecting_has_its_own_remedy() {
+        for (kind, part) in [
+            (io::ErrorKind::NotFound, "is evfocusd running?"),
+            (io::ErrorKind::ConnectionRefused, "Start it again"),
+            (io::ErrorKind::PermissionDenied, "usermod -aG"),
+            (io::ErrorKind::TimedOut, "cannot connect"),
+        ] {
+            let text = ClientError::connecting(Path::new("/run/evfocus/socket"), kind.into()).to_string();
+            assert!(text.contains(part) && text.contains("/run/evfocus/socket"), "{kind}: {text}");
+        }
+    }
+}

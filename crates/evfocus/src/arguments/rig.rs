@@ -11,6 +11,8 @@ use crate::exit::UsageError;
 const SEED_VARIABLE: &str = "EVFOCUS_SIM_SEED";
 /// A hand that shakes by 2 px rolls by 3 mrad.
 const ROLL_RAD_PER_PX: f64 = 0.0015;
+/// Beyond this no sweep could be told from noise, and the roll would leave what the simulation allows.
+const GREATEST_SHAKE_PX: f64 = 60.0;
 
 /// The simulated camera, lens and scene.
 #[derive(Debug, Clone, Args)]
@@ -26,7 +28,7 @@ pub struct RigArguments {
     #[arg(long, value_name = "NAME", default_value = "davis346", value_parser = choices(CameraModel::ALL, CameraModel::name))]
     pub camera: CameraModel,
     /// Hand shake, in pixels RMS; 2 is a hand, 7 is violent
-    #[arg(long, value_name = "PX_RMS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "PX_RMS", default_value_t = 0.0, value_parser = shake, allow_negative_numbers = true)]
     pub shake: f64,
     /// Steady motion of the scene to the right, in pixels per second
     #[arg(long, value_name = "PX_PER_S", default_value_t = 0.0, allow_negative_numbers = true)]
@@ -89,6 +91,13 @@ impl RigArguments {
         rig.seed = seed;
         rig.validate().map_err(|error| UsageError(format!("no such rig: {error}")))?;
         Ok(rig)
+    }
+}
+
+fn shake(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if (0.0..=GREATEST_SHAKE_PX).contains(&value) => Ok(value),
+        _ => Err(format!("{text:?} is not a number of pixels RMS from 0 to {GREATEST_SHAKE_PX}")),
     }
 }
 

@@ -13,6 +13,7 @@ use evfocus_record::Format;
 
 use crate::arguments::{choices, duration};
 use crate::exit::Exit;
+use crate::files::must_differ;
 use crate::output::{Output, warn};
 use crate::plot::FocusPlot;
 use crate::recording::{self, RecordingAnalysis, Request};
@@ -31,7 +32,8 @@ The positions file says where the lens was, one sample a line, oldest first:
   1000,221.8
 t_us is in microseconds of the camera's clock, position in the lens's own counts. It must cover the recording (10 ms at either \
 end may be missing). Where the lens turns round, a new sweep begins; with sweeps in both directions the answer is the mean of \
-both, which cancels lag and backlash, and the delay says how large those were.
+both, which cancels lag and backlash. Half their difference (delay_us in JSON, as a time) is lag plus backlash, and with methods \
+that answer with the first of two humps of events mostly how far those are apart.
 
 Units: positions in lens counts, times in microseconds of the camera's clock (t_us), rates in events per second.
 
@@ -68,6 +70,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
         method: arguments.method,
         interval: arguments.interval,
     };
+    if let Some(plot) = &arguments.plot {
+        let (recording, positions) = (&request.recording, &request.positions);
+        must_differ(&[("the recording", recording), ("--plot", plot)])?;
+        must_differ(&[("--positions", positions), ("--plot", plot)])?;
+    }
     let analysis = recording::analyze(&request)?;
     for warning in &analysis.warnings {
         warn(warning);

@@ -5,8 +5,8 @@ use std::time::Duration;
 use anyhow::bail;
 use clap::Args;
 use evfocus_core::LensSpeed;
-use evfocus_ipc::client::Following;
-use evfocus_ipc::{FocusRequest, LensRange, Phase, Progress, Report, State};
+use evfocus_ipc::client::{ClientError, Following};
+use evfocus_ipc::{Error, FocusRequest, LensRange, Phase, Progress, Report, State};
 
 use crate::arguments::{SocketArguments, duration, position, speed};
 use crate::connection::{block_on, connect};
@@ -93,6 +93,32 @@ async fn focus(arguments: &Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::of_run(report.result.state == State::Focused))
 }
 
+/// Names the options that were typed, where the daemon names the parameters of its interface.
+fn in_own_words(error: ClientError) -> anyhow::Error {
+    let ClientError::Refused(refused) = &error else { return error.into() };
+    let words = if let Error::InvalidArgument { name, remedy, .. } = refused {
+        // The remedy has the value in it, in the unit that people write.
+        option(name).map(|option| format!("{option}: {remedy}"))
+    } else if let Error::OutOfRange { what, value, min, max } = refused {
+        option(what).map(|option| format!("{option} is {value}; it must be from {min} to {max}"))
+    } else {
+        None
+    };
+    words.map_or_else(|| error.into(), anyhow::Error::msg)
+}
+
+/// The option that sets `parameter`.
+fn option(parameter: &str) -> Option<&'static str> {
+    match parameter {
+        "interval_us" => Some("--interval"),
+        "speed_counts_per_s" => Some("--speed"),
+        "range" => Some("--from and --to"),
+        "range start" => Some("--from"),
+        "range end" => Some("--to"),
+        _ => None,
+    }
+}
+
 /// News until the run's report; none if the user is too impatient even for an abort.
 async fn follow(
     run: &mut Following<Progress>,
@@ -104,7 +130,7 @@ async fn follow(
     loop {
         tokio::select! {
             news = run.next() => {
-                let Some(progress) = news? else { bail!("evfocusd ended the run without a report") };
+                let Some(progress) = news.map_err(in_own_words)? else { bail!("evfocusd ended the run without a report") };
                 if let Some(live) = live.as_deref_mut() {
                     live.show(&progress, out)?;
                 }

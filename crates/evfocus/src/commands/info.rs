@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 
 use crate::arguments::choices;
 use crate::exit::Exit;
+use crate::files::must_not_be_folder;
 use crate::output::Output;
 use crate::quantity::{count, rate, seconds};
 
@@ -61,6 +62,7 @@ struct Info {
 
 /// Prints the summary.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
+    must_not_be_folder(&arguments.recording, "recording")?;
     let summary = Summary::of_file(&arguments.recording, arguments.format)?;
     let info = Info::of(arguments, &summary);
     let mut out = Output::new();
@@ -86,7 +88,10 @@ impl Info {
             off: summary.off,
             first_t_us: summary.first_t_us,
             last_t_us: summary.last_t_us,
-            duration_us: summary.first_t_us.zip(summary.last_t_us).map(|(first, last)| last - first),
+            duration_us: summary
+                .first_t_us
+                .zip(summary.last_t_us)
+                .map(|(first, last)| last.saturating_sub(first)),
             mean_rate: summary.mean_rate.map(|rate| rate.0),
             peak_rate: summary.peak_rate.map(|rate| rate.0),
             gaps: summary.gaps,
@@ -109,7 +114,7 @@ impl Info {
         }
         writeln!(out, "events     {} ({} ON, {} OFF)", count(self.events), count(self.on), count(self.off))?;
         if let (Some(first), Some(last)) = (self.first_t_us, self.last_t_us) {
-            writeln!(out, "time       {first} to {last} us, {}", seconds((last - first) as f64))?;
+            writeln!(out, "time       {first} to {last} us, {}", seconds(last.saturating_sub(first) as f64))?;
         }
         if let Some(mean) = self.mean_rate {
             writeln!(out, "mean rate  {}", rate(mean))?;

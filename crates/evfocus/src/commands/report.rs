@@ -17,7 +17,7 @@ use crate::report_text;
 #[command(after_help = "\
 Examples:
   evfocus report
-  evfocus report 7 --json | jq .estimators
+  evfocus report 7 --json | jq '.sweeps[].estimators'
   evfocus report --plot curve.svg
 
 Units: positions in lens counts, rates in events per second, t_us in microseconds of the camera's clock, elapsed_s in seconds.

@@ -1,15 +1,17 @@
 //! `evfocus simulate`: a sweep on a simulated rig, as a recording.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use evfocus_core::LensSpeed;
+use evfocus_core::{LensRange, LensSpeed};
 use hil_sim::Scene;
 
 use crate::arguments::{RigArguments, duration, speed};
-use crate::exit::Exit;
+use crate::exit::{Exit, UsageError};
+use crate::files::{must_differ, must_have_folder};
 use crate::output::Output;
 use crate::quantity::count;
 use crate::simulation::{Plan, simulate};
@@ -49,7 +51,7 @@ pub struct Arguments {
     #[arg(long)]
     both_directions: bool,
     /// How long the lens stands before, between and after the sweeps, with its unit
-    #[arg(long, value_name = "DURATION", default_value = "60ms", value_parser = duration)]
+    #[arg(long, value_name = "DURATION", default_value = "60ms", value_parser = rest)]
     rest: Duration,
     /// Write frames of linear intensity into this folder
     #[arg(long, value_name = "DIR", requires = "fps")]
@@ -64,14 +66,21 @@ pub struct Arguments {
     rig: RigArguments,
 }
 
+/// How long a sweep may take, in seconds, whether it is given as a time or as a speed. A recording is as long.
+const SWEEP_S: RangeInclusive<f64> = 0.01..=1000.0;
+/// The longest rest.
+const LONGEST_REST: Duration = Duration::from_secs(100);
+
 /// Simulates, writes the files and says what is in them.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     let rig = arguments.rig.rig(Scene::DeadLeaves)?;
-    let speed = match (arguments.speed, arguments.sweep_s) {
-        (Some(speed), _) => speed,
-        (None, Some(seconds)) => LensSpeed::new(rig.lens.range.length() / seconds)?,
-        (None, None) => rig.lens.max_speed,
-    };
+    let speed = sweep_speed(arguments, rig.lens.range)?.unwrap_or(rig.lens.max_speed);
+    let frame_list = arguments.frames.as_ref().map(|folder| folder.join("frames.csv"));
+    let mut files: Vec<(&str, &Path)> =
+        vec![("--out", &arguments.out), ("--positions", &arguments.positions), ("--truth", &arguments.truth)];
+    must_have_folder(&files)?;
+    files.extend(frame_list.as_deref().map(|list| ("--frames", list)));
+    must_differ(&files)?;
     let truth = simulate(&Plan {
         rig,
         recording: arguments.out.clone(),
@@ -92,10 +101,40 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Done)
 }
 
+/// The speed that the options name, if one does.
+fn sweep_speed(arguments: &Arguments, range: LensRange) -> anyhow::Result<Option<LensSpeed>> {
+    let length = range.length();
+    if let Some(speed) = arguments.speed.map(LensSpeed::counts_per_second)
+        && !SWEEP_S.contains(&(length / speed))
+    {
+        let (shortest, longest) = SWEEP_S.into_inner();
+        return Err(UsageError(format!(
+            "--speed {speed} is out of range: a sweep of the {length:.0} counts takes from {shortest} to {longest} s, so the \
+             speed must be from {} to {} counts per second",
+            length / longest,
+            length / shortest
+        ))
+        .into());
+    }
+    let from_time = arguments.sweep_s.map(|seconds| LensSpeed::new(length / seconds)).transpose()?;
+    Ok(arguments.speed.or(from_time))
+}
+
+fn rest(text: &str) -> Result<Duration, String> {
+    let rest = duration(text)?;
+    if rest > LONGEST_REST {
+        return Err(format!("{text} is longer than {} s", LONGEST_REST.as_secs()));
+    }
+    Ok(rest)
+}
+
 fn seconds(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
-        Ok(value) if (0.01..=1000.0).contains(&value) => Ok(value),
-        _ => Err(format!("{text:?} is not a number of seconds from 0.01 to 1000")),
+        Ok(value) if SWEEP_S.contains(&value) => Ok(value),
+        _ => {
+            let (shortest, longest) = SWEEP_S.into_inner();
+            Err(format!("{text:?} is not a number of seconds from {shortest} to {longest}"))
+        }
     }
 }
 

@@ -20,6 +20,10 @@ const SHORTEST_REST_SHARE: f64 = 0.1;
 const REST_SHARE: f64 = 0.002;
 /// A trace that turns round more often is no sweep.
 const MOST_LEGS: usize = 64;
+/// A sweep takes seconds; ten minutes of counts are 50 MB.
+const LONGEST_SWEEP_US: i64 = 600_000_000;
+/// 100 days, rests included.
+const LONGEST_TRACE_US: i64 = 100 * 86_400_000_000;
 
 /// One way of the lens.
 #[derive(Debug)]
@@ -49,6 +53,7 @@ pub(super) struct SweepLegs {
 /// Cuts `trace` into sweeps.
 pub(super) fn sweep_legs(trace: &LensTrace<CameraMicros>, path: &Path) -> anyhow::Result<SweepLegs> {
     let Some((low, high)) = trace.extent() else { bail!("{}: no positions", shown(path)) };
+    check_span(trace, path)?;
     let legs = trace.legs(TURN_SHARE * high.distance(low));
     if legs.is_empty() {
         bail!(
@@ -88,14 +93,49 @@ pub(super) fn sweep_legs(trace: &LensTrace<CameraMicros>, path: &Path) -> anyhow
     Ok(SweepLegs { sweeps, warnings })
 }
 
+/// Refuses times that lie further apart than any logger runs: those are no microseconds, or no times.
+fn check_span(trace: &LensTrace<CameraMicros>, path: &Path) -> anyhow::Result<()> {
+    if let Some(((first, _), (last, _))) = trace.first().zip(trace.last())
+        && last.micros_since(first) > LONGEST_TRACE_US
+    {
+        bail!(
+            "{}: the times go from {} to {} us, which is more than {} days; write t_us in microseconds of the camera's clock",
+            shown(path),
+            first.0,
+            last.0,
+            LONGEST_TRACE_US / 86_400_000_000
+        );
+    }
+    Ok(())
+}
+
 impl SweepLegs {
+    /// Refuses a sweep that takes longer than any: the counter's memory grows with its time.
+    pub(super) fn check_lengths(&self, positions: &Path) -> anyhow::Result<()> {
+        for sweep in &self.sweeps {
+            let micros = sweep.end.micros_since(sweep.start);
+            if micros > LONGEST_SWEEP_US {
+                bail!(
+                    "{}: the sweep from {} to {} us takes {:.0} s; at most {} s can be analyzed. Is t_us in microseconds? \
+                     Else cut the positions and the recording to the time in which the lens moves",
+                    shown(positions),
+                    sweep.start.0,
+                    sweep.end.0,
+                    micros as f64 * 1e-6,
+                    LONGEST_SWEEP_US / 1_000_000
+                );
+            }
+        }
+        Ok(())
+    }
+
     /// Lets the sweeps at the ends take the events for which there are no positions any more: a few milliseconds at most.
     pub(super) fn stretch_to(&mut self, (first, last): (CameraMicros, CameraMicros)) {
         if let Some(sweep) = self.sweeps.first_mut().filter(|sweep| sweep.rest_since.is_none()) {
             sweep.start = sweep.start.min(first);
         }
         if let Some(sweep) = self.sweeps.last_mut().filter(|sweep| !sweep.rests_after) {
-            sweep.end = sweep.end.max(CameraMicros(last.0 + 1));
+            sweep.end = sweep.end.max(CameraMicros(last.0.saturating_add(1)));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `analyze`, `info` and `simulate` on healthy recordings and on those that cannot be focused.
 
 use std::fs;
+use std::path::Path;
 
 use crate::program::{Sweep, evfocus, json, json_with_status, number, sweep, text};
 use serde_json::Value;
@@ -53,6 +54,10 @@ fn the_mean_of_both_directions_cancels_the_delay() {
     assert!((number(&analysis, "position") - mean).abs() < 1e-9);
     let delay_us = (answers[0] - answers[1]) / 2.0 / number(&sweeps[0], "speed_counts_per_s") * 1e6;
     assert!((number(&analysis, "delay_us") - delay_us).abs() < 1e-6);
+    let words = crate::program::stdout(&evfocus(&both.analyze()));
+    let half = (answers[0] - answers[1]) / 2.0;
+    let told = format!("half the difference of the directions  {half:.1} counts ({:.2} ms)", delay_us * 1e-3);
+    assert!(words.contains(&told) && !words.contains("delay"), "no {told:?} in {words}");
     assert_eq!(both.truth["times_us"].as_array().unwrap().len(), 2);
 }
 
@@ -67,6 +72,40 @@ fn a_blank_wall_fails_with_a_named_reason_and_shows_what_was_estimated() {
     assert!(["too-few-events", "flat"].contains(&analysis["reason"].as_str().unwrap()), "{analysis}");
     assert_eq!(analysis["position"], Value::Null);
     assert_eq!(analysis["sweeps"][0]["state"], "failed");
+}
+
+#[test]
+fn the_answers_are_those_of_the_reference_implementations() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/sweeps");
+    let table = fs::read_to_string(folder.join("reference.tsv")).unwrap();
+    let mut lines = table.lines().map(|line| line.split('\t').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let mut compared = 0;
+    for line in lines {
+        let cell = |name: &str| line[header.iter().position(|column| *column == name).unwrap()];
+        let file = |end: &str| folder.join(format!("{}.{end}", cell("recording")));
+        let truth: Value = serde_json::from_slice(&fs::read(file("truth.json")).unwrap()).unwrap();
+        let (recording, positions) = (file("raw"), file("positions.csv"));
+        for (method, interval, column, tolerance) in [
+            ("egs", "55ms", "egs", 4.0),
+            ("egs-official", "55ms", "egs_official", 15.0),
+            ("er-fixed", "55ms", "er_fixed_55ms", 5.0),
+            ("er-fixed", "65ms", "er_fixed_65ms", 5.0),
+        ] {
+            let options = ["--method", method, "--interval", interval, "--json"];
+            let files = ["analyze", text(&recording), "--positions", text(&positions)];
+            let analysis = json(&[&files[..], &options].concat());
+            let error = number(&analysis, "position") - number(&truth, "gt_position");
+            let reference: f64 = cell(column).parse().unwrap();
+            assert!(
+                (error - reference).abs() <= tolerance,
+                "{} {column}: {error:+.1} instead of {reference:+.1}",
+                cell("recording")
+            );
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 16);
 }
 
 #[test]

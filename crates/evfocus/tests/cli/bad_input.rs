@@ -178,8 +178,125 @@ fn simulated_rigs_that_make_no_sense_are_refused() {
     refuses(&with(&["--focus", "9000"]), 2, &["focus", "9000", "3750"]);
     refuses(&with(&["--scene", "moon"]), 2, &["moon", "dead-leaves"]);
     refuses(&with(&["--sweep-s", "-2"]), 2, &["-2", "seconds"]);
-    refuses(&with(&["--shake", "-2"]), 2, &["shake_px_rms", "-2"]);
+    for shake in ["-2", "100", "NaN"] {
+        refuses(&with(&["--shake", shake]), 2, &["--shake", shake, "from 0 to 60"]);
+        refuses(&["demo", "--shake", shake], 2, &["--shake", shake, "from 0 to 60"]);
+    }
+    for speed in ["1e-12", "1", "1e300"] {
+        refuses(&with(&["--speed", speed]), 2, &["--speed", "from 0.01 to 1000 s", "3.53 to 353000"]);
+    }
+    for seconds in ["1e-12", "1e12", "inf"] {
+        refuses(&with(&["--sweep-s", seconds]), 2, &["--sweep-s", "from 0.01 to 1000"]);
+    }
+    refuses(&with(&["--rest", "80000s"]), 2, &["--rest", "100 s"]);
     refuses(&with(&["--frames", "somewhere"]), 2, &["--fps"]);
+}
+
+#[test]
+fn two_outputs_into_one_file_are_refused_before_anything_is_written() {
+    let files = Files::new();
+    let folder = files.0.path();
+    let (raw, csv, json) = (folder.join("a.raw"), folder.join("a.csv"), folder.join("a.json"));
+    let again = folder.join(".").join("a.raw");
+    let simulate = |out: &Path, positions: &Path, truth: &Path, parts: &[&str]| {
+        let arguments = ["simulate", "--sweep-s", "0.05", "--out", text(out), "--positions", text(positions)];
+        refuses(&[&arguments[..], &["--truth", text(truth)]].concat(), 2, parts);
+    };
+    simulate(&raw, &again, &json, &["--out", "--positions", "a.raw"]);
+    simulate(&raw, &csv, &again, &["--out", "--truth", "a.raw"]);
+    simulate(&raw, &csv, &csv, &["--positions", "--truth", "a.csv"]);
+    assert_eq!(fs::read_dir(folder).unwrap().count(), 0, "nothing was written");
+
+    let kept = files.file("kept.raw", "a recording");
+    let linked = folder.join("linked.csv");
+    std::os::unix::fs::symlink(&kept, &linked).unwrap();
+    simulate(&kept, &linked, &json, &["--out", "--positions", "linked.csv"]);
+    assert_eq!(fs::read_to_string(&kept).unwrap(), "a recording");
+}
+
+#[test]
+fn a_plot_does_not_overwrite_what_it_is_drawn_from() {
+    for (path, name) in [(&sweep().recording, "the recording"), (&sweep().positions, "--positions")] {
+        let before = fs::read(path).unwrap();
+        let mut arguments = sweep().analyze();
+        arguments.extend(["--plot", text(path)]);
+        refuses(&arguments, 2, &[name, "--plot"]);
+        assert!(fs::read(path).unwrap() == before, "{name} was overwritten");
+    }
+}
+
+#[test]
+fn devices_take_any_number_of_outputs() {
+    let null = "/dev/null";
+    let files = Files::new();
+    let raw = files.0.path().join("a.raw");
+    let arguments =
+        ["simulate", "--sweep-s", "0.05", "--out", text(&raw), "--positions", null, "--truth", null];
+    assert!(evfocus(&arguments).status.success());
+}
+
+#[test]
+fn a_missing_folder_is_named_before_anything_is_written() {
+    let files = Files::new();
+    let there = ["--out", "--positions", "--truth"].map(|option| (option, files.0.path().join(option)));
+    for (missing, _) in &there {
+        let mut arguments = vec!["simulate", "--sweep-s", "0.05"];
+        for (option, path) in &there {
+            arguments.extend([*option, if option == missing { "/nowhere/file" } else { text(path) }]);
+        }
+        refuses(&arguments, 1, &[missing, "/nowhere/file", "no directory /nowhere", "make it"]);
+    }
+    assert_eq!(fs::read_dir(files.0.path()).unwrap().count(), 0, "nothing was written");
+}
+
+#[test]
+fn a_directory_is_no_recording_and_no_positions() {
+    let files = Files::new();
+    let folder = text(files.0.path());
+    refuses_recording(files.0.path(), &[folder, "directory", "recording file"]);
+    let recording = text(&sweep().recording);
+    refuses(&["analyze", recording, "--positions", folder], 1, &[folder, "directory", "positions file"]);
+}
+
+/// Six thousand events, one every `step_us`, one a line.
+fn csv_events(step_us: i64) -> String {
+    let lines: Vec<String> =
+        (0..6000).map(|index| format!("{},{},1,{}", index % 300, index % 200, index * step_us)).collect();
+    lines.join("\n")
+}
+
+#[test]
+fn times_that_are_far_apart_are_refused_and_take_no_memory() {
+    let files = Files::new();
+    for (begin, last) in [(0, 4_000_000_000_000_000_i64), (0, i64::MAX), (i64::MIN, i64::MAX)] {
+        let events = format!("7,7,0,{begin}\n{}\n7,7,0,{last}", csv_events(1000));
+        let recording = files.file("far.csv", format!("x,y,p,t\n{events}\n"));
+        let positions = files.file("far-lens.csv", format!("t_us,position\n{begin},220\n{last},3750\n"));
+        let output = evfocus(&["analyze", text(&recording), "--positions", text(&positions)]);
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.starts_with("error: "), "{message}");
+        let output = evfocus(&["info", text(&recording)]);
+        assert!(matches!(output.status.code(), Some(0 | 1)), "{}", stderr(&output));
+    }
+    let recording = files.file("slow.csv", format!("x,y,p,t\n{}\n", csv_events(200_000)));
+    let positions = files.file("slow-lens.csv", "t_us,position\n0,220\n1199800000,3750\n");
+    refuses(
+        &["analyze", text(&recording), "--positions", text(&positions)],
+        1,
+        &["slow-lens.csv", "1199800001 us", "1200 s", "at most 600 s", "microseconds", "cut"],
+    );
+}
+
+#[test]
+fn a_socket_that_nobody_listens_on_is_told_from_none() {
+    let files = Files::new();
+    let socket = files.0.path().join("socket");
+    drop(std::os::unix::net::UnixListener::bind(&socket).unwrap());
+    for command in [&["status"][..], &["focus"], &["move", "1985"], &["watch"]] {
+        let arguments = [command, &["--socket", text(&socket)]].concat();
+        refuses(&arguments, 1, &[text(&socket), "nobody listens", "evfocusd --socket"]);
+    }
 }
 
 #[test]

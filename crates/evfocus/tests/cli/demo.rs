@@ -31,9 +31,10 @@ fn without_a_terminal_nothing_is_drawn() {
     let output = evfocus(&["demo", "--seed", "2", "--shake", "2", "--report", crate::program::text(&plot)]);
     let text = stdout(&output);
     assert!(output.status.success() && !text.contains('\x1b'), "{text}");
-    for part in ["focused at", "truth", "error", "seed       2"] {
+    for part in ["focused at", "truth", "error", "seed       2", "half the difference of the directions  "] {
         assert!(text.contains(part), "no {part:?} in {text}");
     }
+    assert!(!text.contains("delay"), "{text}");
     assert!(std::fs::read_to_string(&plot).unwrap().contains("truth"));
 }
 
@@ -72,6 +73,12 @@ fn every_help_has_examples_and_those_with_quantities_name_units() {
     for part in ["Exit status", "counts/s", "55ms"] {
         assert!(help.contains(part), "no {part:?}");
     }
+}
+
+#[test]
+fn the_help_of_report_shows_where_the_estimators_are() {
+    let help = stdout(&evfocus(&["report", "--help"]));
+    assert!(help.contains("jq '.sweeps[].estimators'"), "{help}");
 }
 
 #[test]

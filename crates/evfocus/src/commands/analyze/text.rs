@@ -5,7 +5,7 @@ use std::io::Write;
 use evfocus_core::Method;
 
 use crate::output::Output;
-use crate::quantity::{count, rate, seconds};
+use crate::quantity::{count, half_difference, rate, seconds};
 use crate::recording::{RecordingAnalysis, SweepAnalysis};
 
 pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::Result<()> {
@@ -14,7 +14,8 @@ pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::R
         Err(failure) => writeln!(out, "failed: {}: {failure}", failure.name())?,
     }
     if let Some(delay_us) = analysis.verdict.delay_us {
-        writeln!(out, "delay {:.2} ms (half the difference of the two directions)", delay_us * 1e-3)?;
+        let speed = analysis.sweeps.first().map(|sweep| sweep.speed.counts_per_second());
+        writeln!(out, "{}", half_difference(delay_us, speed))?;
     }
     for sweep in &analysis.sweeps {
         print_sweep(sweep, analysis.method, out)?;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::output::Output;
-use crate::quantity::count;
+use crate::quantity::{count, half_difference};
 
 /// Positions in lens counts, times in seconds of the rig's virtual time.
 #[derive(Debug, Serialize)]
@@ -24,6 +24,9 @@ pub(super) struct DemoOutcome {
     lens_position: f64,
     method: &'static str,
     delay_us: Option<f64>,
+    /// Of the sweeps, in counts per second.
+    #[serde(skip)]
+    speed: f64,
     elapsed_s: f64,
     events: u64,
     seed: u64,
@@ -65,6 +68,7 @@ impl DemoOutcome {
             lens_position: report.position_after.0,
             method: report.plan.method.name(),
             delay_us: report.delay_us,
+            speed: report.plan.speed.counts_per_second(),
             elapsed_s: report.elapsed().as_secs_f64(),
             events: report.sweeps().map(|sweep| sweep.on + sweep.off).sum(),
             seed: rig.seed,
@@ -89,11 +93,7 @@ impl DemoOutcome {
         }
         writeln!(out, "lens       {:.1} counts", self.lens_position)?;
         if let Some(delay_us) = self.delay_us {
-            writeln!(
-                out,
-                "delay      {:.2} ms (half the difference of the two directions)",
-                delay_us * 1e-3
-            )?;
+            writeln!(out, "{}", half_difference(delay_us, Some(self.speed)))?;
         }
         for said in &self.estimators {
             let way = if said.sweep == 1 { "there" } else { "back" };
