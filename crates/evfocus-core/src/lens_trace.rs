@@ -161,7 +161,7 @@ impl<T: Timestamp> LensTrace<T> {
             // Only one sample, and it is exactly at the time asked for.
             return Ok(self.samples.front().map_or(LensPosition(0.0), |&(_, position)| position));
         };
-        let share = (micros - t0.micros() as f64) / (t1.micros() - t0.micros()) as f64;
+        let share = (micros - t0.micros() as f64) / (t1.micros() as f64 - t0.micros() as f64);
         Ok(LensPosition(p0.0 + share * (p1.0 - p0.0)))
     }
 
@@ -186,7 +186,7 @@ impl<T: Timestamp> LensTrace<T> {
             let crosses = (before < 0.0 && after >= 0.0) || (before > 0.0 && after <= 0.0);
             crosses.then(|| {
                 let share = before / (before - after);
-                t0.micros() as f64 + share * (t1.micros() - t0.micros()) as f64
+                t0.micros() as f64 + share * (t1.micros() as f64 - t0.micros() as f64)
             })
         })
     }

@@ -1,6 +1,8 @@
 //! One answer from the sweeps of a recording, by the rules of the controller.
 
-use evfocus_core::{ControllerConfig, Failure, LensPosition, LensRange, Method, SweepLimits};
+use evfocus_core::{
+    ControllerConfig, Failure, LensPosition, LensRange, Method, SweepLimits, combine, is_at_edge,
+};
 use evfocus_ipc::Direction;
 
 use super::SweepAnalysis;
@@ -41,18 +43,14 @@ fn answer(sweeps: &[SweepAnalysis], method: Method, delay_us: &mut Option<f64>) 
     let position = match (mean(sweeps, method, Direction::Forward), mean(sweeps, method, Direction::Backward))
     {
         (Some(forward), Some(backward)) => {
-            let half = forward.counts_from(backward) / 2.0;
-            if half.abs() > rules.largest_mismatch_share * range.length() {
-                return Err(Failure::DirectionMismatch { forward, backward });
-            }
-            *delay_us = Some(half / first.speed.counts_per_second() * 1e6);
-            LensPosition(f64::midpoint(forward.0, backward.0))
+            let combined = combine(forward, backward, range, rules.largest_mismatch_share)?;
+            *delay_us = Some(combined.half_difference / first.speed.counts_per_second() * 1e6);
+            combined.position
         }
         (Some(only), None) | (None, Some(only)) => only,
         (None, None) => return Err(nothing),
     };
-    let to_edge = position.distance(range.min()).min(position.distance(range.max()));
-    if to_edge < rules.edge_share * range.length() {
+    if is_at_edge(position, range, rules.edge_share) {
         return Err(Failure::PeakAtEdge { position });
     }
     Ok(Answer { position, t_us: first.passed(position, method) })
