@@ -62,8 +62,8 @@ impl Analyzer {
         let quality = SweepQuality::of(&sweep).map_err(|error| Failure::NoAnswer(error.into()))?;
         report.quality = quality;
         for other in Method::ALL {
-            // The squared rate reads the events many times over; it runs only when it is what was asked for.
-            if other != Method::ErSquared || method == other {
+            // The cost of these grows with the number of events; they run only when they are what was asked for.
+            if !other.reads_every_event() || method == other {
                 let said = self.searcher.search(other, &sweep, interval);
                 if let Some(place) = report.estimates.get_mut(other as usize) {
                     *place = Some(said);

@@ -3,6 +3,7 @@
 mod egs;
 mod egs_official;
 mod er_fixed;
+mod structure;
 
 use core::fmt;
 use core::str::FromStr;
@@ -16,6 +17,9 @@ use crate::sweep::Sweep;
 use crate::units::LensPosition;
 
 pub use egs::{Comparison, GOLDEN_RATIO, MAX_ITERATIONS, STOP_INTERVAL_US, golden_search};
+pub use structure::{Apex, ApexFinder, LEAST_SIGNIFICANCE, StructureKernel, TravelStep};
+
+use structure::StructureSearch;
 
 /// A focus measure together with the search that looks for its maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -28,11 +32,14 @@ pub enum Method {
     ErFixed,
     /// Golden search on the sum of the squared event rates of the pixels: the paper's F_ev to the letter.
     ErSquared,
+    /// The highest energy of the fine structure of the picture that the events add up to.
+    Structure,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: [Self; 4] = [Self::Egs, Self::EgsOfficial, Self::ErFixed, Self::ErSquared];
+    pub const ALL: [Self; 5] =
+        [Self::Egs, Self::EgsOfficial, Self::ErFixed, Self::ErSquared, Self::Structure];
 
     /// The name users know it by.
     pub fn name(self) -> &'static str {
@@ -41,6 +48,16 @@ impl Method {
             Self::EgsOfficial => "egs-official",
             Self::ErFixed => "er-fixed",
             Self::ErSquared => "er-squared",
+            Self::Structure => "structure",
+        }
+    }
+
+    /// Whether it goes over every event, so that its cost grows with their number. The others take differences of totals or look a
+    /// few events up.
+    pub fn reads_every_event(self) -> bool {
+        match self {
+            Self::Egs | Self::EgsOfficial | Self::ErFixed => false,
+            Self::ErSquared | Self::Structure => true,
         }
     }
 }
@@ -53,7 +70,7 @@ impl fmt::Display for Method {
 
 /// A method name that is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("no such method; use one of egs, egs-official, er-fixed, er-squared")]
+#[error("no such method; use one of egs, egs-official, er-fixed, er-squared, structure")]
 pub struct UnknownMethod;
 
 impl FromStr for Method {
@@ -70,9 +87,10 @@ pub struct Estimate {
     pub position: LensPosition,
     /// Its time on the camera's clock, microseconds.
     pub t_us: f64,
-    /// Comparisons (golden searches) or windows (fixed interval) made.
+    /// Comparisons (golden searches), windows (fixed interval) or passes over the events (structure) made.
     pub iterations: u32,
-    /// Length of the last accumulation interval, microseconds.
+    /// Length of the last accumulation interval; for structure the time that the lens spent within the full width at half height
+    /// of the peak; microseconds.
     pub interval_us: f64,
 }
 
@@ -103,6 +121,20 @@ pub enum SearchError {
         /// Events beyond the buffer.
         not_kept: u64,
     },
+    /// The sweep begins and ends at the same lens position.
+    #[error("the sweep begins and ends at the same lens position, {at}")]
+    NoTravel {
+        /// That position.
+        at: LensPosition,
+    },
+    /// No lens position makes the picture sharper by more than chance does.
+    #[error(
+        "no peak above chance (significance {significance:.1}, {LEAST_SIGNIFICANCE} is needed): nothing with texture is in view, or it is too dark"
+    )]
+    Weak {
+        /// How high the highest peak is in units of what chance makes.
+        significance: f64,
+    },
     /// The counter does not cover the sweep.
     #[error(transparent)]
     Counter(#[from] CounterError),
@@ -115,12 +147,13 @@ pub enum SearchError {
 #[derive(Debug, Clone)]
 pub struct Searcher {
     pixel_counts: PixelCounts,
+    structure: StructureSearch,
 }
 
 impl Searcher {
     /// A searcher for sweeps of sensors of `geometry`.
     pub fn new(geometry: Geometry) -> Self {
-        Self { pixel_counts: PixelCounts::new(geometry) }
+        Self { pixel_counts: PixelCounts::new(geometry), structure: StructureSearch::new(geometry) }
     }
 
     /// Looks for the sharpest moment of `sweep`. `interval` is the accumulation interval of [`Method::ErFixed`] (the paper
@@ -142,6 +175,7 @@ impl Searcher {
             Method::ErSquared => egs::search_squared(sweep, &mut self.pixel_counts),
             Method::EgsOfficial => egs_official::search(sweep),
             Method::ErFixed => er_fixed::search(sweep, interval),
+            Method::Structure => self.structure.search(sweep),
         }
     }
 }

@@ -59,6 +59,8 @@ pub(crate) struct Scene {
     pub(crate) highest_rate: f64,
     /// Share of the events that follow the mains.
     pub(crate) flicker: f64,
+    /// Share of the events that follow the picture: stripes that gain contrast on the way to focus and lose it beyond.
+    pub(crate) texture: f64,
 }
 
 #[derive(Debug)]
@@ -106,6 +108,7 @@ impl Rig {
             peak_rate: 1e5,
             highest_rate: f64::INFINITY,
             flicker: 0.0,
+            texture: 0.9,
         };
         let mut rig = Self {
             controller: Controller::new(config, GEOMETRY, now),
@@ -237,9 +240,13 @@ impl Rig {
             }
             let time = CameraMicros(start + t as i64);
             let flicker = self.scene.flicker * (TAU * 100.0 * time.0 as f64 * 1e-6).sin();
-            let polarity = Polarity::from_on(self.random.uniform() < f64::midpoint(1.0, flicker));
+            let chance = self.random.uniform();
             let place = self.random.next();
             let (x, y) = (place as u16 % GEOMETRY.width, (place >> 16) as u16 % GEOMETRY.height);
+            let stripe = if x / 2 % 2 == 0 { 1.0 } else { -1.0 };
+            let gains = -distance.signum() * self.way;
+            let picture = self.scene.texture * (1.0 - self.scene.flicker) * stripe * gains;
+            let polarity = Polarity::from_on(chance < f64::midpoint(1.0, flicker + picture));
             self.batch.events.push(Event { t: time, x, y, polarity });
         }
     }
