@@ -50,9 +50,14 @@ pub(crate) fn sweep(events: usize, kept: usize) -> (SweepRecorder, LensTrace<Cam
         recorder.feed(&batch);
         delay(&mut batch, SWEEP_US / batches);
     }
+    (recorder, trace())
+}
+
+/// One count a millisecond, over the whole sweep.
+pub(crate) fn trace() -> LensTrace<CameraMicros> {
     let mut trace = LensTrace::with_capacity(4_001);
     for millisecond in 0..=4_000 {
         trace.push_if_later(CameraMicros(millisecond * 1_000), LensPosition(millisecond as f64));
     }
-    (recorder, trace)
+    trace
 }
