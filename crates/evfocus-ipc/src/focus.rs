@@ -17,7 +17,7 @@ pub struct LensRange {
 /// How to focus. What is left out is taken from the daemon's configuration.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FocusRequest {
-    /// The search: `egs`, `egs-official`, `er-fixed`, `er-squared`, ...; an unknown one is answered with the known ones.
+    /// The search: `egs`, `egs-official`, `er-fixed`, `er-squared`, `structure`, ...; an unknown one is answered with the known ones.
     pub method: Option<String>,
     /// The positions to sweep, in counts.
     pub range: Option<LensRange>,

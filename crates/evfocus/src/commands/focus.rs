@@ -32,7 +32,7 @@ Ctrl-C leaves at once. If the command is killed or loses its connection, the run
 
 Exit status: 0 focused, 1 an error, 2 wrong usage, 3 the run ended without focus.")]
 pub struct Arguments {
-    /// Focus measure and search: egs, egs-official, er-fixed, er-squared
+    /// Focus measure and search: egs, egs-official, er-fixed, er-squared, structure
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
     /// Low end of the sweep, in lens counts

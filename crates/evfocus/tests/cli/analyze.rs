@@ -27,7 +27,7 @@ fn a_shaken_sweep_is_focused_near_the_truth() {
 
 #[test]
 fn every_method_answers_when_asked() {
-    for method in ["egs", "egs-official", "er-fixed", "er-squared"] {
+    for method in ["egs", "egs-official", "er-fixed", "er-squared", "structure"] {
         let mut arguments = sweep().analyze();
         arguments.extend(["--json", "--method", method, "--interval", "0.03s"]);
         let analysis = json(&arguments);

@@ -85,6 +85,9 @@ fn the_help_of_report_shows_where_the_estimators_are() {
 fn completions_know_the_commands() {
     for shell in ["bash", "zsh", "fish"] {
         let script = stdout(&evfocus(&["completions", shell]));
-        assert!(script.contains("analyze") && script.contains("er-squared"), "{shell}");
+        assert!(
+            script.contains("analyze") && script.contains("er-squared") && script.contains("structure"),
+            "{shell}"
+        );
     }
 }

@@ -15,7 +15,7 @@ const MOST_BYTES: f64 = 4e9;
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FocusSection {
-    /// `egs` (default), `egs-official`, `er-fixed` or `er-squared`.
+    /// `egs` (default), `egs-official`, `er-fixed`, `er-squared` or `structure`.
     pub method: Option<String>,
     /// Accumulation interval of `er-fixed`, milliseconds; 1 to 10,000, default 55.
     pub interval_ms: Option<f64>,
