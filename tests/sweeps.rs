@@ -31,7 +31,7 @@ const STRUCTURE_TOLERANCE: f64 = 2.0;
 /// Sweeps whose peak is no parabola, so that one bin more or less at its top moves the vertex by ten counts, and one in which focus is
 /// so near to the start that we go over the events twice, which the table's answer does not: the largest difference allowed.
 const LOOSE: [(&str, f64); 3] =
-    [("low_texture_light_static", 10.0), ("saturated_light_shake", 4.0), ("near_start_light_shake", 80.0)];
+    [("low_texture_light_static", 10.0), ("saturated_light_shake", 4.0), ("near_start_light_shake", 60.0)];
 
 fn tolerance_of(method: Method, tolerance: f64, name: &str) -> f64 {
     let loose = LOOSE.iter().find(|(loose, _)| *loose == name && method == Method::Structure);
@@ -113,11 +113,11 @@ fn structure(sweep: &RecordedSweep, leg: &SweepRecorder) -> anyhow::Result<Resul
 }
 
 /// `sweep` with other events.
-fn with_events(sweep: &RecordedSweep, events: Vec<Event>) -> SweepRecorder {
+fn with_events(sweep: &RecordedSweep, events: &[Event]) -> SweepRecorder {
     let capacity = SweepCapacity { events: events.len(), ..SweepCapacity::default() };
     let mut recorder = SweepRecorder::new(sweep.geometry, capacity);
     recorder.start(events.first().map_or_else(Default::default, |event| event.t));
-    recorder.feed(&events);
+    recorder.feed(events);
     recorder
 }
 
@@ -148,7 +148,7 @@ fn structure_says_that_pixels_in_disorder_are_no_picture() -> anyhow::Result<()>
             let place = places[usize::from(event.y) * width + usize::from(event.x)];
             (event.x, event.y) = ((place % width) as u16, (place / width) as u16);
         }
-        let answer = structure(&sweep, &with_events(&sweep, events))?;
+        let answer = structure(&sweep, &with_events(&sweep, &events))?;
         println!("{:28} {answer:?}", row.name);
         assert!(matches!(answer, Err(SearchError::Weak { .. })), "{}: {answer:?}", row.name);
     }
@@ -169,8 +169,8 @@ fn structure_does_not_mind_events_that_have_nothing_to_do_with_the_picture() -> 
         });
     }
     events.sort_by_key(|event| event.t);
-    let clean = structure(&sweep, &with_events(&sweep, sweep.events.clone()))??;
-    let noisy = structure(&sweep, &with_events(&sweep, events))??;
+    let clean = structure(&sweep, &with_events(&sweep, &sweep.events))??;
+    let noisy = structure(&sweep, &with_events(&sweep, &events))??;
     println!("clean {clean:+.1}, half as many events by chance {noisy:+.1}");
     assert!((noisy - clean).abs() < 15.0, "{clean:+.1} {noisy:+.1}");
     Ok(())
@@ -198,7 +198,7 @@ fn structure_without_its_rule_for_turning_points_lags() -> anyhow::Result<()> {
     }
     let apex = ApexFinder::new().find(&growth);
     let plain = low.0 + apex.at / bins_per_count - sweep.truth.0;
-    let ours = structure(&sweep, &with_events(&sweep, sweep.events.clone()))??;
+    let ours = structure(&sweep, &with_events(&sweep, &sweep.events))??;
     println!("plain {plain:+.1}, with the rule {ours:+.1}");
     assert!((10.0..40.0).contains(&(plain - ours)), "{plain:+.1} {ours:+.1}");
     Ok(())

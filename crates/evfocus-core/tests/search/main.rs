@@ -1,5 +1,5 @@
 //! Focus measures, searches and what they say of a sweep's quality, on streams whose answer is known.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test whose own fixture is missing fails")]
+#![expect(clippy::unwrap_used, reason = "a test whose own fixture is missing fails")]
 
 #[path = "../support/random.rs"]
 mod random;

@@ -100,7 +100,7 @@ proptest! {
             for index in 0..number {
                 let place = random.next();
                 let (x, y) = ((place >> 8) as u16 % 8, (place >> 24) as u16 % 8);
-                let polarity = Polarity::from_on(place >> 40 & 3 == 0);
+                let polarity = Polarity::from_on(random.uniform() < 0.3);
                 let step = (index * usize::from(TravelStep::END.0) / number) as u16;
                 events.push((Event { t: CameraMicros(0), x, y, polarity }, TravelStep(step)));
             }

@@ -186,9 +186,9 @@ impl Change {
 
 /// Where the pixel came back across the level of its last event, if at `now` it came back across the one below.
 fn first_crossing(before: History, now: TravelStep) -> TravelStep {
-    let mirrored = TravelStep(now.0.saturating_sub(before.gap));
-    let is_known = before.gap <= now.0;
-    if is_known & (mirrored >= before.last) { mirrored } else { before.last.midpoint(now) }
+    // An unknown gap, or one longer than the way so far, wraps round to beyond `now`.
+    let mirrored = TravelStep(now.0.wrapping_sub(before.gap));
+    if (before.last..=now).contains(&mirrored) { mirrored } else { before.last.midpoint(now) }
 }
 
 /// (K E)(x) at `place`.
