@@ -134,3 +134,119 @@ impl LensThread {
         self.control.unpark();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use evfocus_core::{LensPosition, LensRange, LensSpeed};
+    use evfocus_hal::{DeviceErrorKind, LensInfo, VirtualClock};
+    use rtrb::{Consumer, RingBuffer};
+
+    use super::super::orders::orders;
+    use super::*;
+
+    /// What the lens was told, and whether it answers.
+    #[derive(Debug, Default)]
+    struct Wire {
+        told: Vec<&'static str>,
+        silent: bool,
+    }
+
+    struct FakeLens(Arc<Mutex<Wire>>);
+
+    impl FakeLens {
+        fn tell(&self, what: &'static str) -> Result<(), DeviceError> {
+            let mut wire = self.0.lock().unwrap();
+            wire.told.push(what);
+            if wire.silent {
+                Err(DeviceError::new(DeviceErrorKind::TimedOut, "fake lens", what))
+            } else {
+                Ok(())
+            }
+        }
+    }
+
+    impl Lens for FakeLens {
+        fn info(&self) -> LensInfo {
+            LensInfo {
+                model: "fake".to_owned(),
+                serial: "1".to_owned(),
+                range: LensRange::new(LensPosition(0.0), LensPosition(1.0)).unwrap(),
+                max_speed: LensSpeed::new(1.0).unwrap(),
+                needs_homing: false,
+            }
+        }
+        fn home(&mut self) -> Result<(), DeviceError> {
+            self.tell("home")
+        }
+        fn move_to(&mut self, _: LensPosition, _: LensSpeed) -> Result<(), DeviceError> {
+            self.tell("move")
+        }
+        fn stop(&mut self) -> Result<(), DeviceError> {
+            self.tell("stop")
+        }
+        fn sample(&mut self) -> Result<LensSample, DeviceError> {
+            self.tell("sample")?;
+            let (requested, replied) = (HostMicros(0), HostMicros(0));
+            Ok(LensSample { requested, replied, position: LensPosition(0.5), moving: true })
+        }
+    }
+
+    struct Bench {
+        thread: LensThread,
+        wire: Arc<Mutex<Wire>>,
+        notices: Consumer<Notice>,
+        samples: Consumer<LensSample>,
+    }
+
+    fn bench() -> Bench {
+        let wire = Arc::new(Mutex::new(Wire::default()));
+        let (samples_in, samples) = RingBuffer::new(SAMPLES);
+        let (notices_in, notices) = RingBuffer::new(8);
+        let thread = LensThread {
+            lens: Box::new(FakeLens(Arc::clone(&wire))),
+            clock: Arc::new(VirtualClock::new()),
+            poll: Duration::from_millis(2),
+            orders: orders().1,
+            samples: samples_in,
+            notices: notices_in,
+            control: std::thread::current(),
+        };
+        Bench { thread, wire, notices, samples }
+    }
+
+    /// Any motion will do.
+    const MOVE: Action = Action::Home;
+
+    #[test]
+    fn a_lens_that_fell_silent_in_a_motion_is_stopped_before_it_counts_again() {
+        let mut bench = bench();
+        let (mut health, mut attentive) = (Health::Sound, HostMicros(0));
+        bench.thread.obey(MOVE, &mut health);
+        bench.wire.lock().unwrap().silent = true;
+        assert_eq!(bench.thread.look(&mut health, &mut attentive), RETRY);
+        assert_eq!(
+            bench.notices.pop(),
+            Ok(Notice::LensFailed(evfocus_core::controller::DeviceFailure::Silent))
+        );
+        bench.thread.obey(Action::StopLens, &mut health);
+        bench.thread.obey(MOVE, &mut health);
+        bench.wire.lock().unwrap().silent = false;
+        bench.thread.look(&mut health, &mut attentive);
+        // The stop was tried while it was silent and again once it answered; the motion was not.
+        assert_eq!(bench.wire.lock().unwrap().told, ["home", "sample", "stop", "sample", "stop"]);
+        assert_eq!(bench.notices.pop(), Ok(Notice::LensReady));
+        assert!(bench.notices.pop().is_err(), "one failure, one recovery");
+        assert!(bench.samples.pop().is_ok());
+    }
+
+    #[test]
+    fn the_end_of_the_orders_stops_the_lens() {
+        let bench = bench();
+        let wire = Arc::clone(&bench.wire);
+        // The sender is gone already.
+        bench.thread.run();
+        assert_eq!(wire.lock().unwrap().told.last(), Some(&"stop"));
+    }
+}
