@@ -17,8 +17,8 @@ use crate::units::{CameraMicros, HostMicros};
 
 /// Camera time from one point of the live curve to the next, microseconds: what an eye can follow.
 const LIVE_STEP_US: i64 = 20_000;
-/// Points of the live curve: a sweep of 80 s.
-const LIVE_POINTS: usize = 4_000;
+/// Points of the live curve: the longest sweep that can be configured, 120 s.
+const LIVE_POINTS: usize = 6_000;
 #[derive(Debug)]
 pub(super) struct SweepState {
     recorder: SweepRecorder,
