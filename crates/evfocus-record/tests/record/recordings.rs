@@ -71,6 +71,13 @@ fn csv_of_a_davis346() {
 }
 
 #[test]
+fn csv_that_others_wrote() {
+    let mut recording = Recording::open(data("davis346_events_head.csv"), None).unwrap();
+    assert_eq!(recording.format(), Format::Csv);
+    assert_eq!(read_all(&mut recording), davis_events()[..20_000]);
+}
+
+#[test]
 fn usb_words_of_a_davis346() {
     let expected = shifted(&davis_events(), 1000 - DAVIS_FIRST_US);
     let mut recording = Recording::open(data("davis346_usb_words_made.bin"), None).unwrap();
