@@ -2,6 +2,7 @@
 
 mod running;
 
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -24,6 +25,8 @@ pub struct SimCamera {
     clock: Arc<dyn Clock>,
     epoch: HostMicros,
     serial: String,
+    /// See [`Rig::dropped_by_rate_cap`](crate::Rig::dropped_by_rate_cap).
+    capped: Arc<AtomicU64>,
     running: Option<Running>,
     /// Whether this handle has noticed that the camera was unplugged: it stays dead, as a file handle would.
     gone: bool,
@@ -42,8 +45,9 @@ impl SimCamera {
         clock: Arc<dyn Clock>,
         epoch: HostMicros,
         serial: String,
+        capped: Arc<AtomicU64>,
     ) -> Self {
-        Self { picture, lens, clock, epoch, serial, running: None, gone: false }
+        Self { picture, lens, clock, epoch, serial, capped, running: None, gone: false }
     }
 
     fn error(&self, kind: DeviceErrorKind, what: &str) -> DeviceError {
@@ -69,7 +73,7 @@ impl Camera for SimCamera {
             model: sensor.model.clone(),
             serial: self.serial.clone(),
             geometry: sensor.geometry,
-            rate_ceiling: Some(sensor.readout_events_per_s as u64),
+            rate_ceiling: Some(sensor.rate_ceiling() as u64),
         }
     }
 
@@ -78,7 +82,8 @@ impl Camera for SimCamera {
         if self.running.is_none() {
             let since = self.clock.now().micros_since(self.epoch).max(0);
             let first = (since + STEP_MICROS - 1) / STEP_MICROS * STEP_MICROS;
-            self.running = Some(Running::new(&self.picture, &self.lens, self.epoch, first));
+            self.running =
+                Some(Running::new(&self.picture, &self.lens, self.epoch, first, Arc::clone(&self.capped)));
         }
         Ok(())
     }

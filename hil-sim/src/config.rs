@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use evfocus_core::LensPosition;
 
+use crate::fan::FanConfig;
 use crate::faults::{Fault, FaultKind, FaultTrigger};
 use crate::lens::LensConfig;
 use crate::motion::MotionConfig;
@@ -26,6 +27,8 @@ pub struct RigConfig {
     pub optics: OpticsConfig,
     /// How the picture moves.
     pub motion: MotionConfig,
+    /// A fan that turns in the picture; `None` for none.
+    pub fan: Option<FanConfig>,
     /// The light's flicker; `None` for daylight.
     pub flicker: Option<Flicker>,
     /// The lens.
@@ -63,6 +66,7 @@ impl RigConfig {
         ConfigError::check("motion.vibration_px_rms", self.motion.vibration_px_rms, 0.0, 1000.0)?;
         ConfigError::check("motion.velocity_px_per_s.0", self.motion.velocity_px_per_s.0, -1e5, 1e5)?;
         ConfigError::check("motion.velocity_px_per_s.1", self.motion.velocity_px_per_s.1, -1e5, 1e5)?;
+        self.fan.map_or(Ok(()), |fan| fan.validate())?;
         if let Some(flicker) = self.flicker {
             ConfigError::check("flicker.hertz", flicker.hertz, 0.1, 500.0)?;
             ConfigError::check("flicker.depth", flicker.depth, 0.0, 1.0)?;
@@ -88,6 +92,7 @@ impl Default for RigConfig {
             second_focus: LensPosition(2785.0),
             optics: OpticsConfig::default(),
             motion: MotionConfig::default(),
+            fan: None,
             flicker: None,
             lens: LensConfig::default(),
             link: LinkConfig::default(),

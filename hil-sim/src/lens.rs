@@ -8,6 +8,7 @@ mod config;
 mod profile;
 mod state;
 mod trajectory;
+mod warp;
 
 use std::cell::Cell;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -15,7 +16,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
 use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
-pub use config::LensConfig;
+pub use config::{LensConfig, LensKind};
 pub(crate) use state::LensState;
 use trajectory::Command;
 

@@ -9,6 +9,7 @@
 
 mod camera;
 mod config;
+mod fan;
 mod faults;
 mod fourier;
 mod lens;
@@ -23,11 +24,12 @@ mod sensor;
 
 pub use camera::SimCamera;
 pub use config::{ConfigError, Flicker, LinkConfig, RigConfig};
+pub use fan::FanConfig;
 pub use faults::{Fault, FaultKind, FaultTrigger};
-pub use lens::{LensConfig, SimLens};
+pub use lens::{LensConfig, LensKind, SimLens};
 pub use motion::MotionConfig;
 pub use names::NameError;
 pub use optics::{OpticsConfig, PointSpread};
 pub use rig::Rig;
 pub use scene::Scene;
-pub use sensor::{CameraModel, Light, SensorConfig};
+pub use sensor::{CameraModel, Light, Logarithm, PatchNoise, RateCap, SensorConfig};

@@ -25,6 +25,9 @@ pub struct OpticsConfig {
     pub blur_px_per_count: f64,
     /// The growth above focus as a multiple of that below. Default 1; spherical aberration makes 1.15.
     pub slope_ratio: f64,
+    /// How much further up the lens range the right margin of the picture is in focus than the left one, counts: a tilted
+    /// sensor. In between it goes in proportion, and the picture's middle keeps the scene's focus. Default 0.
+    pub tilt_counts: f64,
     /// Growth of the picture over the whole lens range, as a share; -0.04 to 0.04. Default 0.
     pub breathing: f64,
     /// Sigma of aberrations and diffraction in focus, pixels; the pixel's square aperture adds to it. Default 0.45.
@@ -40,9 +43,16 @@ impl OpticsConfig {
         0.5 * self.blur_px_per_count * slope * counts.abs()
     }
 
+    /// Radius of the largest blur circle of anything that is sharp at `focus`, for positions from `low` to `high`.
+    pub(crate) fn largest_radius(&self, focus: f64, (low, high): (f64, f64)) -> f64 {
+        let margin = 0.5 * self.tilt_counts.abs();
+        self.radius(low - focus - margin).max(self.radius(high - focus + margin))
+    }
+
     pub(crate) fn validate(&self) -> Result<(), ConfigError> {
         ConfigError::check("optics.blur_px_per_count", self.blur_px_per_count, 0.0, 1.0)?;
         ConfigError::check("optics.slope_ratio", self.slope_ratio, 0.1, 10.0)?;
+        ConfigError::check("optics.tilt_counts", self.tilt_counts, -1e4, 1e4)?;
         ConfigError::check("optics.breathing", self.breathing, -0.2, 0.2)?;
         ConfigError::check("optics.floor_sigma_px", self.floor_sigma_px, 0.05, 20.0)
     }
@@ -53,6 +63,7 @@ impl Default for OpticsConfig {
         Self {
             blur_px_per_count: 0.0175,
             slope_ratio: 1.0,
+            tilt_counts: 0.0,
             breathing: 0.0,
             floor_sigma_px: 0.45,
             point_spread: PointSpread::Disc,
@@ -126,6 +137,20 @@ impl BlurStack {
         let above = self.squares.partition_point(|&level| level <= square).clamp(1, self.squares.len() - 1);
         let (low, high) = (self.squares[above - 1], self.squares[above]);
         Blend { level: above - 1, share: ((square - low) / (high - low)).clamp(0.0, 1.0) as f32 }
+    }
+
+    /// Puts `pixels` (row by row) of the picture blurred by `blend` into `out`.
+    pub(crate) fn mix(&self, pixels: std::ops::Range<usize>, blend: Blend, out: &mut [f32]) {
+        let [sharp, soft] =
+            [blend.level, blend.level + 1].map(|level| &self.levels[level].values[pixels.clone()]);
+        mix(sharp, soft, blend.share, out);
+    }
+}
+
+/// `out = first + share (second - first)`.
+pub(crate) fn mix(first: &[f32], second: &[f32], share: f32, out: &mut [f32]) {
+    for ((out, first), second) in out.iter_mut().zip(first).zip(second) {
+        *out = first + share * (second - first);
     }
 }
 

@@ -1,27 +1,47 @@
 //! The light on the sensor at one instant: blur, motion, breathing and flicker put together.
 
+mod rows;
+
 use std::sync::OnceLock;
 
 use crate::config::RigConfig;
+use crate::fan::{Fan, Place};
 use crate::motion::{Motion, Pose};
-use crate::optics::{Blend, BlurStack};
+use crate::optics::{Blend, BlurStack, mix};
 use crate::random::Stream;
+use rows::{extend, shifted, split, stretched};
+
+/// Columns that share a degree of blur where the sensor is tilted.
+const STRIP: usize = 8;
 
 /// Everything about the light that does not change while the rig lives.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    /// Each plane's stack and focus position. Made when first looked at: who only wants the lens does not wait for it.
-    planes: OnceLock<Vec<(BlurStack, f64)>>,
+    /// Made when first looked at: who only wants the lens does not wait for it.
+    content: OnceLock<Content>,
     motion: Motion,
     config: RigConfig,
     width: usize,
     height: usize,
 }
 
+/// What there is to be seen.
+#[derive(Debug)]
+struct Content {
+    /// Each plane's stack and focus position.
+    planes: Vec<(BlurStack, f64)>,
+    fan: Option<(Fan, f64)>,
+    /// Size of the scene, which repeats.
+    canvas: (usize, usize),
+}
+
 /// What determines the light on the sensor; equal views make equal pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct View {
+    /// Of each plane in turn: from left to right, one for each strip of the scene.
     blends: Vec<Blend>,
+    /// Blur and angle of the fan.
+    fan: Option<(Blend, f64)>,
     pose: Pose,
     /// Magnification against that in the middle of the lens range.
     scale: f64,
@@ -33,6 +53,7 @@ pub(crate) struct View {
 pub(crate) struct Scratch {
     blended: [Vec<f32>; 2],
     line: Vec<f32>,
+    fan: Vec<f32>,
 }
 
 impl Picture {
@@ -40,7 +61,7 @@ impl Picture {
         let geometry = config.sensor.geometry;
         let (width, height) = (usize::from(geometry.width), usize::from(geometry.height));
         Self {
-            planes: OnceLock::new(),
+            content: OnceLock::new(),
             motion: Motion::new(&config.motion, &mut Stream::Shake.generator(config.seed)),
             config,
             width,
@@ -48,18 +69,35 @@ impl Picture {
         }
     }
 
-    fn planes(&self) -> &[(BlurStack, f64)] {
-        self.planes.get_or_init(|| {
+    fn content(&self) -> &Content {
+        self.content.get_or_init(|| {
             let config = &self.config;
-            let planes = config.scene.planes(self.width, self.height, config.seed).into_iter().map(|plane| {
-                let focus = if plane.second { config.second_focus } else { config.focus };
-                let ends = [config.lens.range.min(), config.lens.range.max()];
-                let largest = ends.map(|end| config.optics.radius(end.counts_from(focus)));
-                let stack = BlurStack::new(&plane.texture, &config.optics, largest[0].max(largest[1]));
-                (stack, focus.0)
+            let optics = &config.optics;
+            let positions = (config.lens.range.min().0, config.lens.range.max().0);
+            let mut planes = config.scene.planes(self.width, self.height, config.seed);
+            let fan = config.fan.map(|fan| {
+                let focus = config.focus.0 + fan.depth_counts;
+                let mut textures: Vec<_> = planes.iter_mut().map(|plane| &mut plane.texture).collect();
+                let largest = optics.largest_radius(focus, positions);
+                (Fan::new(&fan, (self.width, self.height), &mut textures, optics, largest), focus)
             });
-            planes.collect()
+            let canvas = planes.first().map_or((1, 1), |plane| (plane.texture.width, plane.texture.height));
+            let planes = planes.into_iter().map(|plane| {
+                let focus = if plane.second { config.second_focus } else { config.focus }.0;
+                (BlurStack::new(&plane.texture, optics, optics.largest_radius(focus, positions)), focus)
+            });
+            Content { planes: planes.collect(), fan, canvas }
         })
+    }
+
+    /// How much further up the lens range the picture is in focus than in its middle, `right` pixels to the right of that.
+    fn tilt(&self, right: f64) -> f64 {
+        self.config.optics.tilt_counts * (right / self.width as f64).clamp(-0.5, 0.5)
+    }
+
+    /// Columns of the scene that share a degree of blur.
+    fn strip(&self) -> usize {
+        if self.config.optics.tilt_counts.abs() > 0.0 { STRIP } else { self.content().canvas.0 }
     }
 
     pub(crate) fn config(&self) -> &RigConfig {
@@ -75,13 +113,26 @@ impl Picture {
         let range = self.config.lens.range;
         let middle = f64::midpoint(range.min().0, range.max().0);
         let optics = &self.config.optics;
+        let Content { planes, fan, canvas } = self.content();
+        let pose = self.motion.pose(seconds);
+        let (strip, canvas_width) = (self.strip(), canvas.0 as f64);
+        let mut blends = Vec::new();
+        for (stack, focus) in planes {
+            blends.extend((0..canvas.0.div_ceil(strip)).map(|index| {
+                // The tilt stays with the sensor while the scene moves: it is that of the place where the strip is seen.
+                let column = (index * strip) as f64 + 0.5 * (strip as f64) + pose.right;
+                let right = column.rem_euclid(canvas_width) - 0.5 * canvas_width;
+                stack.blend(optics.radius(position - focus - self.tilt(right)))
+            }));
+        }
+        let fan = fan.as_ref().zip(self.config.fan).map(|((fan, focus), config)| {
+            let tilt = self.tilt((config.middle.0 - 0.5) * self.width as f64);
+            (fan.blend(optics.radius(position - focus - tilt)), config.angle(seconds))
+        });
         View {
-            blends: self
-                .planes()
-                .iter()
-                .map(|(stack, focus)| stack.blend(optics.radius(position - focus)))
-                .collect(),
-            pose: self.motion.pose(seconds),
+            blends,
+            fan,
+            pose,
             scale: 1.0 + optics.breathing * (position - middle) / range.length(),
             gain: self.config.flicker.map_or(1.0, |flicker| flicker.gain(seconds)) as f32,
         }
@@ -89,8 +140,16 @@ impl Picture {
 
     /// Puts the light of `view` into `image`, DN, row by row.
     pub(crate) fn render(&self, view: &View, scratch: &mut Scratch, image: &mut [f32]) {
-        for (plane, ((stack, _), blend)) in self.planes().iter().zip(&view.blends).enumerate() {
-            self.render_plane(stack, *blend, view, scratch, image, plane > 0);
+        let Content { planes, fan, canvas } = self.content();
+        let strips = view.blends.len() / planes.len();
+        for (plane, ((stack, _), blends)) in planes.iter().zip(view.blends.chunks_exact(strips)).enumerate() {
+            self.render_plane(stack, blends, view, scratch, image, plane > 0);
+        }
+        if let Some(((fan, _), seen)) = fan.as_ref().zip(view.fan) {
+            let Pose { right, down, roll } = view.pose;
+            let (width, height) = (self.width, self.height);
+            let place = Place { width, height, canvas: *canvas, right, down, roll, scale: view.scale };
+            fan.render(seen, &place, &mut scratch.fan, image);
         }
         if (view.gain - 1.0).abs() > 0.0 {
             for value in image {
@@ -102,17 +161,17 @@ impl Picture {
     fn render_plane(
         &self,
         stack: &BlurStack,
-        blend: Blend,
+        blends: &[Blend],
         view: &View,
         scratch: &mut Scratch,
         image: &mut [f32],
         add: bool,
     ) {
-        let (sharp, soft) = (&stack.levels[blend.level], &stack.levels[blend.level + 1]);
-        let (width, height) = (sharp.width, sharp.height);
+        let (width, height) = self.content().canvas;
+        let strip = self.strip();
         let (middle_x, middle_y) = (self.width as f64 / 2.0, self.height as f64 / 2.0);
         let mut cached: [Option<usize>; 2] = [None; 2];
-        let Scratch { blended, line } = scratch;
+        let Scratch { blended, line, .. } = scratch;
         for row in blended.iter_mut() {
             row.resize(width, 0.0);
         }
@@ -122,8 +181,11 @@ impl Picture {
             let place = row % 2;
             if cached[place] != Some(row) {
                 cached[place] = Some(row);
-                let range = row * width..(row + 1) * width;
-                mix(&sharp.values[range.clone()], &soft.values[range], blend.share, &mut blended[place]);
+                let parts = blended[place].chunks_mut(strip).zip(blends).enumerate();
+                for (index, (out, blend)) in parts {
+                    let first = row * width + index * strip;
+                    stack.mix(first..first + out.len(), *blend, out);
+                }
             }
             place
         };
@@ -148,49 +210,5 @@ impl Picture {
                 shifted(&line[left..=left + self.width], right, out, add);
             }
         }
-    }
-}
-
-/// The whole and the fractional part of a coordinate on a torus.
-fn split(coordinate: f64, size: usize) -> (usize, f32) {
-    let wrapped = coordinate.rem_euclid(size as f64);
-    let whole = (wrapped as usize).min(size - 1);
-    (whole, (wrapped - whole as f64) as f32)
-}
-
-/// Repeats the first `width` values of `line` up to index `end`.
-fn extend(line: &mut [f32], width: usize, end: usize) {
-    let mut have = width;
-    let end = end.min(line.len());
-    while have < end {
-        let count = width.min(end - have);
-        line.copy_within(..count, have);
-        have += count;
-    }
-}
-
-/// `out = first + share (second - first)`.
-fn mix(first: &[f32], second: &[f32], share: f32, out: &mut [f32]) {
-    for ((out, first), second) in out.iter_mut().zip(first).zip(second) {
-        *out = first + share * (second - first);
-    }
-}
-
-/// `out[i]` between `line[i]` and `line[i + 1]`.
-fn shifted(line: &[f32], share: f32, out: &mut [f32], add: bool) {
-    let keep = if add { 1.0 } else { 0.0 };
-    for ((out, first), second) in out.iter_mut().zip(line).zip(&line[1..]) {
-        *out = keep * *out + first + share * (second - first);
-    }
-}
-
-/// `out[i]` at `start + i step` on `line`.
-fn stretched(line: &[f32], start: f32, step: f32, out: &mut [f32], add: bool) {
-    let keep = if add { 1.0 } else { 0.0 };
-    for (index, out) in out.iter_mut().enumerate() {
-        let at = start + index as f32 * step;
-        let whole = (at as usize).min(line.len() - 2);
-        let share = at - whole as f32;
-        *out = keep * *out + line[whole] + share * (line[whole + 1] - line[whole]);
     }
 }

@@ -15,6 +15,7 @@ pub(crate) enum Stream {
     Shake,
     Transfers,
     LensReadOut,
+    PatchNoise,
 }
 
 impl Stream {

@@ -1,5 +1,6 @@
 //! The simulated rig: camera, lens and scene that belong together, and what only the simulator knows.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use evfocus_core::{HostMicros, LensPosition};
@@ -19,6 +20,7 @@ pub struct Rig {
     lens: Arc<Mutex<LensState>>,
     clock: Arc<dyn Clock>,
     epoch: HostMicros,
+    capped: Arc<AtomicU64>,
 }
 
 impl std::fmt::Debug for Rig {
@@ -36,7 +38,8 @@ impl Rig {
         config.validate()?;
         let epoch = clock.now();
         let lens = LensState::new(config.lens, &config.faults, Stream::LensReadOut.generator(config.seed));
-        Ok(Self { picture: Arc::new(Picture::new(config)), lens: Arc::new(Mutex::new(lens)), clock, epoch })
+        let (picture, lens) = (Arc::new(Picture::new(config)), Arc::new(Mutex::new(lens)));
+        Ok(Self { picture, lens, clock, epoch, capped: Arc::default() })
     }
 
     /// Opens the camera and the lens. Opening them again, after a fault and [`repair`](Self::repair), gives handles to the
@@ -50,6 +53,7 @@ impl Rig {
             Arc::clone(&self.clock),
             self.epoch,
             serial.clone(),
+            Arc::clone(&self.capped),
         );
         (camera, SimLens::new(lens, clock, self.epoch, serial))
     }
@@ -60,7 +64,7 @@ impl Rig {
     }
 
     /// The glass positions at which the scene is sharp: one, or two for a scene with two depths. With backlash the lens
-    /// reports these numbers when it comes from below.
+    /// reports these numbers when it comes from below. On a tilted sensor they are those of the picture's middle.
     pub fn truth(&self) -> Vec<LensPosition> {
         let config = self.config();
         match config.scene {
@@ -71,6 +75,9 @@ impl Rig {
             | Scene::PinkNoise
             | Scene::StarField
             | Scene::Checker
+            | Scene::Foliage
+            | Scene::Buildings
+            | Scene::LowTexture
             | Scene::BlankWall => vec![config.focus],
         }
     }
@@ -78,6 +85,11 @@ impl Rig {
     /// Where the glass really is, or was, at `time`.
     pub fn glass(&self, time: HostMicros) -> LensPosition {
         LensPosition(lock(&self.lens).at(self.seconds(time)).optics)
+    }
+
+    /// Events that the rate cap has dropped since the rig was made. A real device does not tell.
+    pub fn dropped_by_rate_cap(&self) -> u64 {
+        self.capped.load(Ordering::Relaxed)
     }
 
     /// Takes away all faults that have struck by now. Handles that noticed an unplugging stay dead; open new ones.

@@ -1,7 +1,9 @@
 //! What the camera looks at: procedural pictures that repeat at their margins.
 
+pub(crate) mod brush;
 mod chart;
 mod natural;
+mod outdoor;
 mod text;
 
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -25,6 +27,12 @@ pub enum Scene {
     StarField,
     /// A checkerboard of 16 pixel squares.
     Checker,
+    /// Twigs and branches of all sizes against the sky.
+    Foliage,
+    /// Fronts of houses with rows of windows.
+    Buildings,
+    /// A wall with soft shading and weak edges only.
+    LowTexture,
     /// A nearly even grey: nothing to focus on.
     BlankWall,
     /// Dead leaves on the left, text on the right, sharp at different lens positions.
@@ -38,6 +46,9 @@ named!(Scene, "scene", {
     PinkNoise => "pink-noise",
     StarField => "star-field",
     Checker => "checker",
+    Foliage => "foliage",
+    Buildings => "buildings",
+    LowTexture => "low-texture",
     BlankWall => "blank-wall",
     TwoDepths => "two-depths",
 });
@@ -81,6 +92,9 @@ impl Scene {
             Self::PinkNoise => natural::pink_noise(canvas, rng),
             Self::StarField => natural::star_field(canvas, rng),
             Self::Checker => chart::checker(canvas),
+            Self::Foliage => outdoor::foliage(canvas, rng),
+            Self::Buildings => outdoor::buildings(canvas, rng),
+            Self::LowTexture => outdoor::low_texture(canvas, rng),
             Self::BlankWall => chart::blank_wall(canvas),
         }
     }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use evfocus_core::{HostMicros, LensPosition};
 use evfocus_hal::VirtualClock;
 use hil_sim::{
-    CameraModel, Fault, FaultKind, FaultTrigger, LensConfig, Light, MotionConfig, OpticsConfig, Rig,
-    RigConfig, Scene,
+    CameraModel, Fault, FaultKind, FaultTrigger, LensConfig, LensKind, Light, MotionConfig, OpticsConfig,
+    Rig, RigConfig, Scene,
 };
 
 use crate::sweep::{open, section_three};
@@ -19,6 +19,9 @@ fn names_go_both_ways() {
     for &light in Light::ALL {
         assert_eq!(light.to_string().parse(), Ok(light));
     }
+    for &kind in LensKind::ALL {
+        assert_eq!(kind.to_string().parse(), Ok(kind));
+    }
     for &model in CameraModel::ALL {
         assert_eq!(model.to_string().parse(), Ok(model));
     }
@@ -29,7 +32,7 @@ fn an_unknown_name_gets_the_list_of_valid_ones() {
     assert_eq!(
         "siemens".parse::<Scene>().unwrap_err().to_string(),
         "scene \"siemens\" is not known; choose one of: text, siemens-star, dead-leaves, pink-noise, star-field, \
-         checker, blank-wall, two-depths"
+         checker, foliage, buildings, low-texture, blank-wall, two-depths"
     );
     assert_eq!(
         "bright".parse::<Light>().unwrap_err().to_string(),

@@ -7,7 +7,7 @@ use evfocus_core::{CameraMicros, EventBatch, HostMicros, LensPosition, LensSampl
 use evfocus_hal::{
     Camera, CameraInfo, Clock, DeviceError, DeviceErrorKind, Lens, LensInfo, VirtualClock, conformance,
 };
-use hil_sim::{LensConfig, Light, MotionConfig, Rig, RigConfig, SimCamera, SimLens};
+use hil_sim::{LensConfig, LensKind, Light, MotionConfig, Rig, RigConfig, SimCamera, SimLens};
 
 use crate::sweep::section_three;
 
@@ -38,7 +38,7 @@ fn simulated_lenses_conform() {
     let slow_line =
         LensConfig { round_trip: Duration::from_millis(4), needs_homing: true, ..LensConfig::worn() };
     let sticky = LensConfig { stick_slip: 0.5, speed_ripple: 0.0, ..LensConfig::worn() };
-    for lens in [LensConfig::default(), LensConfig::worn(), slow_line, sticky] {
+    for lens in LensKind::ALL.iter().map(|&kind| kind.into()).chain([slow_line, sticky]) {
         let config = RigConfig { lens, ..section_three(Light::Light) };
         conformance::lens(|| {
             let (_, lens, clock) = open(&config);

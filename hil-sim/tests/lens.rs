@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensSpeed};
 use evfocus_hal::{Clock, DeviceErrorKind, Lens};
-use hil_sim::{LensConfig, Light, RigConfig};
+use hil_sim::{Fault, FaultKind, FaultTrigger, LensConfig, LensKind, Light, RigConfig};
 
 use crate::sweep::{open, section_three};
 
@@ -122,6 +122,35 @@ fn stick_slip_stands_still_and_catches_up() {
     let still = cruise.iter().filter(|&&step| step < 1e-9).count();
     let quick = cruise.iter().filter(|&&step| step > 3.4).count();
     assert!(still > 700 && still < 850 && quick > 700, "{still} still, {quick} quick");
+}
+
+#[test]
+fn an_accelerating_motor_comes_to_the_speed_asked_at_its_end() {
+    for drift in [0.5, -0.5, 0.8] {
+        let trace = trace(LensConfig { speed_drift: drift, ..LensConfig::default() }, &[3750.0]);
+        let steps: Vec<f64> = steps(&trace).collect();
+        let (early, late) = (steps[steps.len() / 5], steps[steps.len() * 8 / 10]);
+        let share = |part: f64| if drift > 0.0 { 1.0 - drift * (1.0 - part) } else { 1.0 + drift * part };
+        println!("drift {drift}: {:.0} then {:.0} counts/s in {} ms", early * 1e3, late * 1e3, steps.len());
+        assert!((early / 1.765 - share(0.2)).abs() < 0.01 && (late / 1.765 - share(0.8)).abs() < 0.01);
+        assert!(steps.iter().all(|step| (0.0..1.7651).contains(step)));
+        let planned = 3530.0 / 1.765 + 1.765 / 20.0 * 1e3;
+        assert!((steps.len() as f64 - planned / (1.0 - 0.5 * drift.abs())).abs() < 3.0);
+        assert!((trace.last().unwrap().reported - 3750.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_fault_strikes_where_it_should_with_every_kind_of_lens() {
+    let there = LensPosition(2500.0);
+    for &kind in LensKind::ALL {
+        let stall = Fault { kind: FaultKind::LensStalled, trigger: FaultTrigger::AtPosition(there) };
+        let (sim, _, mut lens, clock) = open(&RigConfig { faults: vec![stall], ..rig(kind.into()) });
+        lens.move_to(LensPosition(3750.0), lens.info().max_speed).unwrap();
+        clock.sleep_until(HostMicros(8_000_000));
+        let stopped = sim.glass(clock.now());
+        assert!((stopped.0 - there.0).abs() < 0.01, "the {kind} lens stands at {stopped}");
+    }
 }
 
 #[test]

@@ -10,8 +10,12 @@
 mod configuration;
 mod conformance;
 mod faults;
+mod foreign;
 mod lens;
+mod patches;
 mod physics;
+mod rate_cap;
 mod repeat;
+mod scenes;
 mod sensor;
 mod sweep;

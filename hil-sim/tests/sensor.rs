@@ -9,10 +9,10 @@ use hil_sim::{CameraModel, Flicker, Light, LinkConfig, MotionConfig, RigConfig, 
 
 use crate::sweep::{open, section_three, watch};
 
-const PIXELS: f64 = 64.0 * 48.0;
+pub(crate) const PIXELS: f64 = 64.0 * 48.0;
 
 /// A sensor without vices before a blank wall, 128 DN bright.
-fn quiet() -> RigConfig {
+pub(crate) fn quiet() -> RigConfig {
     let sensor = SensorConfig {
         geometry: Geometry { width: 64, height: 48 },
         threshold_mismatch: 0.0,
@@ -30,28 +30,28 @@ fn quiet() -> RigConfig {
 }
 
 /// The same in flickering light, which makes events everywhere.
-fn flickering() -> RigConfig {
+pub(crate) fn flickering() -> RigConfig {
     RigConfig { flicker: Some(Flicker { hertz: 100.0, depth: 0.8 }), ..quiet() }
 }
 
-fn with(base: RigConfig, change: impl FnOnce(&mut SensorConfig)) -> RigConfig {
+pub(crate) fn with(base: RigConfig, change: impl FnOnce(&mut SensorConfig)) -> RigConfig {
     let mut config = base;
     change(&mut config.sensor);
     config
 }
 
 /// The events of one second, and how many were lost.
-fn second(config: &RigConfig) -> (Vec<Event>, u64) {
+pub(crate) fn second(config: &RigConfig) -> (Vec<Event>, u64) {
     let (_, mut camera, _, clock) = open(config);
     camera.start().unwrap();
     watch(&mut camera, clock.as_ref(), Duration::from_secs(1))
 }
 
-fn on_share(events: &[Event]) -> f64 {
+pub(crate) fn on_share(events: &[Event]) -> f64 {
     events.iter().filter(|event| event.polarity.is_on()).count() as f64 / events.len() as f64
 }
 
-fn by_pixel(events: &[Event]) -> HashMap<(u16, u16), Vec<i64>> {
+pub(crate) fn by_pixel(events: &[Event]) -> HashMap<(u16, u16), Vec<i64>> {
     let mut pixels: HashMap<_, Vec<i64>> = HashMap::new();
     for event in events {
         pixels.entry((event.x, event.y)).or_default().push(event.t.0);

@@ -1,7 +1,8 @@
 //! A started stream: the sensor, the transfers that bring its events, and the clock that stamps them.
 
 use std::collections::VecDeque;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use evfocus_core::{CameraMicros, Event, EventBatch, HostMicros, Polarity};
@@ -37,6 +38,8 @@ pub(super) struct Running {
     outbox: VecDeque<Event>,
     reached: CameraMicros,
     lost: u64,
+    /// Events that the rate cap has dropped since the rig was made.
+    capped: Arc<AtomicU64>,
 }
 
 impl Running {
@@ -46,6 +49,7 @@ impl Running {
         lens: &Mutex<LensState>,
         epoch: HostMicros,
         start_micros: i64,
+        capped: Arc<AtomicU64>,
     ) -> Self {
         let config = picture.config();
         let seconds = start_micros as f64 / 1e6;
@@ -70,6 +74,7 @@ impl Running {
             outbox: VecDeque::new(),
             reached: stamps.at(start_micros),
             lost: 0,
+            capped,
             stamps,
         };
         running.schedule();
@@ -101,7 +106,9 @@ impl Running {
             self.view = view;
         }
         self.spikes.clear();
-        self.lost += self.sensor.step(&self.image, start, &mut self.spikes);
+        let dropped = self.sensor.step(&self.image, start, &mut self.spikes);
+        self.lost += dropped.by_queue;
+        self.capped.fetch_add(dropped.by_cap, Ordering::Relaxed);
         for (kind, at) in faults {
             let at = (at * 1e6) as i64;
             if let FaultKind::EventLoss { share, duration } = kind {

@@ -5,6 +5,7 @@ use std::time::Duration;
 use evfocus_core::{LensPosition, LensRange, LensSpeed};
 
 use crate::ConfigError;
+use crate::names::named;
 
 /// A motorised lens and its vices. The default is the paper's range and a good motor: no vices, whole counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +30,9 @@ pub struct LensConfig {
     pub stick_slip: f64,
     /// Period of the sticking. Default 40 ms.
     pub stick_slip_period: Duration,
+    /// How the speed changes along each motion, as a share of the speed asked: above zero it rises linearly with time from
+    /// (1 - this) of the speed asked to all of it, below zero it falls from all of it to (1 + this); -0.8 to 0.8.
+    pub speed_drift: f64,
     /// Noise of a reported position, counts RMS.
     pub read_noise: f64,
     /// Step of a reported position, counts; 0 for a continuous one. Default 1.
@@ -39,6 +43,42 @@ pub struct LensConfig {
     pub round_trip: Duration,
     /// Whether the lens refuses to travel before it was homed. Default no.
     pub needs_homing: bool,
+}
+
+/// The usual lenses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum LensKind {
+    /// No vices: [`LensConfig::default`].
+    #[default]
+    Good,
+    /// A bit of everything: [`LensConfig::worn`].
+    Worn,
+    /// A motor whose speed doubles along each motion.
+    Accelerating,
+    /// A motor whose speed ripples by 20 % about its mean.
+    Rippling,
+    /// A motor that stands still for half of the time, in periods of 40 ms.
+    Sticking,
+}
+
+named!(LensKind, "lens", {
+    Good => "good",
+    Worn => "worn",
+    Accelerating => "accelerating",
+    Rippling => "rippling",
+    Sticking => "sticking",
+});
+
+impl From<LensKind> for LensConfig {
+    fn from(kind: LensKind) -> Self {
+        match kind {
+            LensKind::Good => Self::default(),
+            LensKind::Worn => Self::worn(),
+            LensKind::Accelerating => Self { speed_drift: 0.5, ..Self::default() },
+            LensKind::Rippling => Self { speed_ripple: 1.0 / 6.0, ..Self::default() },
+            LensKind::Sticking => Self { stick_slip: 0.5, ..Self::default() },
+        }
+    }
 }
 
 impl LensConfig {
@@ -69,6 +109,7 @@ impl LensConfig {
         )?;
         ConfigError::check("lens.stick_slip", self.stick_slip, 0.0, 0.95)?;
         ConfigError::check("lens.stick_slip_period", self.stick_slip_period.as_secs_f64(), positive, 1e3)?;
+        ConfigError::check("lens.speed_drift", self.speed_drift, -0.8, 0.8)?;
         ConfigError::check("lens.read_noise", self.read_noise, 0.0, self.range.length())?;
         ConfigError::check("lens.read_resolution", self.read_resolution, 0.0, self.range.length())
     }
@@ -91,6 +132,7 @@ impl Default for LensConfig {
             speed_ripple_period: Duration::from_millis(100),
             stick_slip: 0.0,
             stick_slip_period: Duration::from_millis(40),
+            speed_drift: 0.0,
             read_noise: 0.0,
             read_resolution: 1.0,
             read_lag: Duration::ZERO,

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use super::config::LensConfig;
 use super::profile::{Limits, Phase, brake, travel};
+use super::warp::Warp;
 
 /// Motions that are kept: the sensor may lag behind the lens by this many commands.
 const MOTIONS_KEPT: usize = 4096;
@@ -80,7 +81,9 @@ impl Trajectory {
     pub(crate) fn at(&self, seconds: f64) -> LensInstant {
         let index = self.motions.partition_point(|motion| motion.start <= seconds);
         match self.motions.get(index.saturating_sub(1)) {
-            Some(motion) => motion.at(self.warp.profile_time(seconds - motion.start), self.backlash),
+            Some(motion) => {
+                motion.at(self.warp.profile_time(seconds - motion.start, motion.duration), self.backlash)
+            }
             None => LensInstant { motor: self.bounds.0, optics: self.bounds.0, velocity: 0.0, moving: false },
         }
     }
@@ -132,9 +135,8 @@ impl Trajectory {
                 start + after
             })
         })?;
-        // Sticking at most stretches a motion by one of its periods, ripple by the mean slow-down.
-        let latest = self.warp.latest(profile_time);
-        Some(motion.start + bisect(latest, |t| self.warp.profile_time(t) >= profile_time))
+        let latest = self.warp.latest(motion.duration);
+        Some(motion.start + bisect(latest, |t| self.warp.profile_time(t, motion.duration) >= profile_time))
     }
 }
 
@@ -187,45 +189,4 @@ impl Motion {
 /// downwards the gap must close first.
 fn play(optics: f64, motor: f64, backlash: f64) -> f64 {
     optics.clamp(motor, motor + backlash)
-}
-
-/// The unsteadiness of the motor, as a distortion of time: the way stays as planned, the schedule does not.
-#[derive(Debug, Clone, Copy)]
-struct Warp {
-    ripple: f64,
-    ripple_period: f64,
-    stick: f64,
-    stick_period: f64,
-}
-
-impl Warp {
-    fn new(config: &LensConfig) -> Self {
-        Self {
-            ripple: config.speed_ripple,
-            ripple_period: config.speed_ripple_period.as_secs_f64(),
-            stick: config.stick_slip,
-            stick_period: config.stick_slip_period.as_secs_f64(),
-        }
-    }
-
-    /// The time in the planned profile, `seconds` after the motion began; never ahead of it in the mean.
-    fn profile_time(&self, seconds: f64) -> f64 {
-        let mut time = seconds;
-        if self.stick > 0.0 {
-            let period = (time / self.stick_period).floor() * self.stick_period;
-            let slipping = (time - period - self.stick * self.stick_period).max(0.0);
-            time = period + slipping / (1.0 - self.stick);
-        }
-        if self.ripple > 0.0 {
-            // The speed goes between 1 and 1 - 2 ripple of the plan: slower than asked, never faster.
-            let omega = std::f64::consts::TAU / self.ripple_period;
-            time -= self.ripple * (time - (omega * time).sin() / omega);
-        }
-        time
-    }
-
-    /// A time by which `profile_time` has been reached for certain.
-    fn latest(&self, profile_time: f64) -> f64 {
-        (profile_time + self.ripple_period) / (1.0 - self.ripple) + self.stick_period
-    }
 }

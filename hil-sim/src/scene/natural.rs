@@ -4,6 +4,7 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::brush::{cover, hide, stamp};
 use crate::fourier::{Fourier, Texture, frequency};
 
 /// Discs with radii of 3 to 40 pixels, probability as radius^-3, each hiding those before it; brightness evenly distributed
@@ -18,23 +19,9 @@ pub(super) fn dead_leaves(canvas: &mut Texture, rng: &mut Xoshiro256PlusPlus) {
         let radius = (inner + rng.random::<f64>() * (outer - inner)).powf(-0.5);
         let value = 12.0 * 20_f64.powf(rng.random::<f64>());
         let (x, y) = (rng.random::<f64>() * canvas.width as f64, rng.random::<f64>() * canvas.height as f64);
-        disc(canvas, (x, y), radius, value as f32);
-    }
-}
-
-/// A disc with a rim one pixel soft, wrapped round the margins.
-fn disc(canvas: &mut Texture, (x, y): (f64, f64), radius: f64, value: f32) {
-    let (width, height) = (canvas.width as i64, canvas.height as i64);
-    let reach = radius.ceil() as i64 + 1;
-    for row in y as i64 - reach..=y as i64 + reach {
-        for column in x as i64 - reach..=x as i64 + reach {
-            let distance = (column as f64 + 0.5 - x).hypot(row as f64 + 0.5 - y);
-            let cover = (radius + 0.5 - distance).clamp(0.0, 1.0) as f32;
-            let index = row.rem_euclid(height) * width + column.rem_euclid(width);
-            if let Some(pixel) = usize::try_from(index).ok().and_then(|index| canvas.values.get_mut(index)) {
-                *pixel += cover * (value - *pixel);
-            }
-        }
+        stamp(canvas, (x, y), (radius, radius), |pixel, dx, dy| {
+            hide(pixel, cover(radius - dx.hypot(dy)), value as f32);
+        });
     }
 }
 

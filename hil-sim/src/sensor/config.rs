@@ -4,6 +4,9 @@ use std::time::Duration;
 
 use evfocus_core::Geometry;
 
+use super::patches::PatchNoise;
+use super::rate_cap::RateCap;
+use super::response::Logarithm;
 use crate::ConfigError;
 use crate::names::named;
 
@@ -53,8 +56,16 @@ pub struct SensorConfig {
     pub off_threshold: f64,
     /// Standard deviation of both thresholds between pixels, fixed for each pixel; none goes below 0.01.
     pub threshold_mismatch: f64,
-    /// Cut-off frequency of a white pixel, Hz; other pixels have (DN + 20) / 275 of it.
+    /// Standard deviation by which both thresholds of a pixel differ from one event to the next, as in IEBCS. Default 0.
+    pub threshold_jitter: f64,
+    /// The logarithm. Default linear below 20 DN.
+    pub logarithm: Logarithm,
+    /// Cut-off frequency of a white pixel, Hz; other pixels have (DN + dark) / (255 + dark) of it.
     pub cutoff_hz: f64,
+    /// That "dark": the DN to which the bandwidth falls. Default 20.
+    pub cutoff_dark_dn: f64,
+    /// Cut-off of a second low-pass behind the photoreceptor, the same for all pixels, Hz. Default none: a first-order pixel.
+    pub source_follower_hz: Option<f64>,
     /// Shortest time between two events of a pixel.
     pub refractory: Duration,
     /// ON events per second of a pixel in constant light, by leakage.
@@ -66,6 +77,8 @@ pub struct SensorConfig {
     pub shot_noise_black_hz: f64,
     /// The same of a white pixel; linear in between.
     pub shot_noise_white_hz: f64,
+    /// Noise that neighbours share. Default none.
+    pub patch_noise: Option<PatchNoise>,
     /// Number of pixels that fire by themselves.
     pub hot_pixels: u32,
     /// Events per second of each of them.
@@ -74,6 +87,8 @@ pub struct SensorConfig {
     pub latency: Duration,
     /// Standard deviation of the latency.
     pub jitter: Duration,
+    /// The event-rate controller. Default off, as the devices come.
+    pub rate_cap: Option<RateCap>,
     /// Events per second that the read-out takes; the time stamps of what waits are those of its read-out.
     pub readout_events_per_s: f64,
     /// Events that may wait for the read-out; what comes beyond is lost, and counted.
@@ -91,16 +106,22 @@ impl SensorConfig {
             on_threshold: 0.2,
             off_threshold: 0.2,
             threshold_mismatch: 0.03,
+            threshold_jitter: 0.0,
+            logarithm: Logarithm::LinearBelow(20.0),
             cutoff_hz: 250.0,
+            cutoff_dark_dn: 20.0,
+            source_follower_hz: None,
             refractory: Duration::from_micros(500),
             leak_hz: 0.1,
             leak_spread_decades: 0.1,
             shot_noise_black_hz: 0.05,
             shot_noise_white_hz: 0.01,
+            patch_noise: None,
             hot_pixels: 0,
             hot_pixel_hz: 300.0,
             latency: Duration::from_micros(50),
             jitter: Duration::from_micros(20),
+            rate_cap: None,
             readout_events_per_s: 12e6,
             readout_queue: 4096,
             time_resolution: Duration::from_micros(1),
@@ -130,6 +151,12 @@ impl SensorConfig {
         }
     }
 
+    /// Events per second that come out at most: what the read-out takes, or the rate cap lets pass.
+    pub(crate) fn rate_ceiling(&self) -> f64 {
+        let cap = self.rate_cap.map_or(f64::INFINITY, RateCap::events_per_s);
+        self.readout_events_per_s.min(cap).max(1.0)
+    }
+
     fn darkened(self, threshold_mismatch: f64, shot_noise_black_hz: f64) -> Self {
         Self {
             threshold_mismatch,
@@ -149,12 +176,18 @@ impl SensorConfig {
         ConfigError::check("sensor.on_threshold", self.on_threshold, 0.02, 5.0)?;
         ConfigError::check("sensor.off_threshold", self.off_threshold, 0.02, 5.0)?;
         ConfigError::check("sensor.threshold_mismatch", self.threshold_mismatch, 0.0, 1.0)?;
+        ConfigError::check("sensor.threshold_jitter", self.threshold_jitter, 0.0, 1.0)?;
+        self.logarithm.validate()?;
         ConfigError::check("sensor.cutoff_hz", self.cutoff_hz, 0.1, 1e6)?;
+        ConfigError::check("sensor.cutoff_dark_dn", self.cutoff_dark_dn, 0.1, 1e5)?;
+        ConfigError::check("sensor.source_follower_hz", self.source_follower_hz.unwrap_or(1.0), 0.1, 1e6)?;
         ConfigError::check("sensor.refractory", self.refractory.as_secs_f64(), 0.0, 1.0)?;
         ConfigError::check("sensor.leak_hz", self.leak_hz, 0.0, 1000.0)?;
         ConfigError::check("sensor.leak_spread_decades", self.leak_spread_decades, 0.0, 2.0)?;
         ConfigError::check("sensor.shot_noise_black_hz", self.shot_noise_black_hz, 0.0, 1000.0)?;
         ConfigError::check("sensor.shot_noise_white_hz", self.shot_noise_white_hz, 0.0, 1000.0)?;
+        self.patch_noise.map_or(Ok(()), PatchNoise::validate)?;
+        self.rate_cap.map_or(Ok(()), RateCap::validate)?;
         ConfigError::check("sensor.hot_pixels", f64::from(self.hot_pixels), 0.0, width * height)?;
         ConfigError::check("sensor.hot_pixel_hz", self.hot_pixel_hz, 0.001, 1e6)?;
         ConfigError::check("sensor.latency", self.latency.as_secs_f64(), 0.0, 1.0)?;

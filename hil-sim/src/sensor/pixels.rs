@@ -5,6 +5,7 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::config::SensorConfig;
+use super::response::Response;
 use super::{STEP_MICROS, Spike};
 
 /// Pixels that are worked on together.
@@ -13,9 +14,6 @@ const LANES: usize = 32;
 /// The leak of a group of pixels is booked once in this many steps: it moves the memory by much less than a threshold.
 const LEAK_STEPS: usize = 16;
 
-/// DN below which the response is linear and no longer logarithmic, and to which the bandwidth falls.
-const DARK_DN: f32 = 20.0;
-
 /// Smallest threshold of any pixel.
 const LEAST_THRESHOLD: f64 = 0.01;
 
@@ -23,8 +21,10 @@ const LEAST_THRESHOLD: f64 = 0.01;
 #[derive(Debug)]
 pub(super) struct Pixels {
     count: usize,
-    /// Logarithm of the intensity behind the low-pass.
+    /// Logarithm of the intensity behind the low-pass, or behind both of them.
     level: Vec<f32>,
+    /// The same between the two; empty without a second one.
+    receptor: Vec<f32>,
     /// The level at which the next ON event is due: memory plus threshold.
     upper: Vec<f32>,
     /// The level at which the next OFF event is due.
@@ -36,8 +36,9 @@ pub(super) struct Pixels {
     /// Time of the last event, microseconds.
     last: Vec<i64>,
     refractory: i64,
-    /// 2 pi cut-off x step / 275: times (DN + 20) it is the step in time constants.
-    rate: f32,
+    response: Response,
+    /// Standard deviation of the thresholds from one event to the next.
+    threshold_jitter: f32,
     steps: usize,
 }
 
@@ -49,6 +50,7 @@ impl Pixels {
         let mut pixels = Self {
             count,
             level: vec![0.0; padded],
+            receptor: Vec::new(),
             upper: vec![f32::MAX; padded],
             lower: vec![f32::MIN; padded],
             on_threshold: vec![1.0; padded],
@@ -56,7 +58,8 @@ impl Pixels {
             leak: vec![0.0; padded],
             last: vec![i64::MIN / 2; padded],
             refractory: config.refractory.as_micros() as i64,
-            rate: (std::f64::consts::TAU * config.cutoff_hz * step / 275.0) as f32,
+            response: Response::new(config),
+            threshold_jitter: config.threshold_jitter as f32,
             steps: 0,
         };
         for (index, &intensity) in image.iter().enumerate() {
@@ -67,7 +70,7 @@ impl Pixels {
             let (on, off) = (threshold(config.on_threshold), threshold(config.off_threshold));
             let decades: f64 = rng.sample(StandardNormal);
             let leak_hz = config.leak_hz * 10_f64.powf(config.leak_spread_decades * decades);
-            let level = log_intensity(intensity);
+            let level = pixels.response.logarithm(intensity);
             // After a long time before the scene the memory lies anywhere between the thresholds.
             let memory = level - on + rng.random::<f32>() * (on + off);
             pixels.level[index] = level;
@@ -76,6 +79,9 @@ impl Pixels {
             pixels.upper[index] = memory + on;
             pixels.lower[index] = memory - off;
             pixels.leak[index] = (leak_hz * f64::from(on) * step * LEAK_STEPS as f64) as f32;
+        }
+        if config.source_follower_hz.is_some() {
+            pixels.receptor.clone_from(&pixels.level);
         }
         pixels
     }
@@ -100,7 +106,7 @@ impl Pixels {
     ) {
         let leaking = self.steps % LEAK_STEPS;
         self.steps += 1;
-        let rate = self.rate;
+        let response = self.response;
         let mut padding = [0.0; LANES];
         for group in 0..self.level.len() / LANES {
             let first = group * LANES;
@@ -120,7 +126,12 @@ impl Pixels {
             let mut before = [0.0; LANES];
             let level = &mut self.level[range.clone()];
             before.copy_from_slice(level);
-            if advance(level, light, &self.upper[range.clone()], &self.lower[range], rate) {
+            let (upper, lower) = (&self.upper[range.clone()], &self.lower[range.clone()]);
+            let reached = match self.receptor.get_mut(range) {
+                Some(receptor) => follow(level, receptor, light, (upper, lower), response),
+                None => advance(level, light, upper, lower, response),
+            };
+            if reached {
                 self.cross(first, &before, start_micros, spikes, rng);
             }
         }
@@ -157,43 +168,58 @@ impl Pixels {
                 }
                 spikes.push(Spike { micros, pixel: pixel as u32, on });
                 self.last[pixel] = micros;
-                due += threshold;
-                moved += threshold;
+                if self.threshold_jitter > 0.0 {
+                    due = self.redraw(pixel, due, on, rng);
+                } else {
+                    due += threshold;
+                    moved += threshold;
+                }
             }
             self.upper[pixel] += moved;
             self.lower[pixel] += moved;
         }
     }
+
+    /// Draws both thresholds of a pixel anew about the level that it has just crossed; returns the one on the side of `on`.
+    fn redraw(&mut self, pixel: usize, memory: f32, on: bool, rng: &mut Xoshiro256PlusPlus) -> f32 {
+        let mut drawn = |nominal: f32| {
+            let deviation: f32 = rng.sample(StandardNormal);
+            (nominal + self.threshold_jitter * deviation).max(LEAST_THRESHOLD as f32)
+        };
+        let (rise, fall) = (drawn(self.on_threshold[pixel]), drawn(self.off_threshold[pixel]));
+        self.upper[pixel] = memory + rise;
+        self.lower[pixel] = memory - fall;
+        if on { self.upper[pixel] } else { self.lower[pixel] }
+    }
 }
 
-/// Passes `light` through logarithm and low-pass on to `level`; whether any pixel has reached a threshold.
-///
-/// The implicit step is stable whatever the cut-off, and its delay of a ramp is exactly the time constant.
-fn advance(level: &mut [f32], light: &[f32], upper: &[f32], lower: &[f32], rate: f32) -> bool {
+/// Passes `light` through the photoreceptor on to `level`; whether any pixel has reached a threshold.
+fn advance(level: &mut [f32], light: &[f32], upper: &[f32], lower: &[f32], response: Response) -> bool {
     let mut reached = 0;
     for ((((level, &light), &upper), &lower), _) in
         level.iter_mut().zip(light).zip(upper).zip(lower).zip(0..LANES)
     {
-        let step = rate * (light + DARK_DN);
-        *level += step / (1.0 + step) * (log_intensity(light) - *level);
+        *level = response.receive(*level, light);
         reached |= u32::from(*level >= upper) | u32::from(*level <= lower);
     }
     reached != 0
 }
 
-/// Natural logarithm of the intensity in DN, linear below 20 DN with the slope that the logarithm has there.
-fn log_intensity(intensity: f32) -> f32 {
-    let bright = if intensity > DARK_DN { intensity } else { DARK_DN };
-    natural_logarithm(bright) + (intensity - bright) / DARK_DN
-}
-
-/// ln x to 5e-6, for positive normal numbers, in a form that the compiler turns into vector code. Continuous: the
-/// polynomial is exact at the powers of two, else they would show as edges.
-fn natural_logarithm(x: f32) -> f32 {
-    let bits = x.to_bits();
-    let exponent = (bits >> 23) as i32 - 127;
-    let f = f32::from_bits((bits & 0x007F_FFFF) | 0x3F80_0000) - 1.0;
-    // ln(1 + f) = f (ln 2 + (1 - f) q(f)), q by interpolation at five Chebyshev points.
-    let q = 0.306_824_42 + f * (-0.191_703_37 + f * (0.127_608_97 + f * (-0.067_375_18 + f * 0.017_807_826)));
-    std::f32::consts::LN_2 * (exponent as f32 + f) + f * (1.0 - f) * q
+/// The same through a source follower behind the photoreceptor.
+fn follow(
+    level: &mut [f32],
+    receptor: &mut [f32],
+    light: &[f32],
+    (upper, lower): (&[f32], &[f32]),
+    response: Response,
+) -> bool {
+    let mut reached = 0;
+    for ((((level, receptor), &light), &upper), &lower) in
+        level.iter_mut().zip(receptor).zip(light).zip(upper).zip(lower)
+    {
+        *receptor = response.receive(*receptor, light);
+        *level = response.follow(*level, *receptor);
+        reached |= u32::from(*level >= upper) | u32::from(*level <= lower);
+    }
+    reached != 0
 }

@@ -7,7 +7,8 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::config::SensorConfig;
-use super::{STEP_MICROS, Spike};
+use super::rate_cap::Gate;
+use super::{Dropped, STEP_MICROS, Spike};
 
 /// Jitter goes no further than this many standard deviations.
 const JITTER_LIMIT: f64 = 3.0;
@@ -21,6 +22,7 @@ pub(super) struct ReadOut {
     queue: VecDeque<Spike>,
     ordered: Vec<Spike>,
     buckets: Vec<u32>,
+    gate: Option<Gate>,
     latency: f64,
     jitter: f64,
     service_micros: f64,
@@ -36,6 +38,7 @@ impl ReadOut {
             queue: VecDeque::new(),
             ordered: Vec::new(),
             buckets: Vec::new(),
+            gate: config.rate_cap.map(Gate::new),
             latency: config.latency.as_secs_f64() * 1e6,
             jitter: config.jitter.as_secs_f64() * 1e6,
             service_micros: 1e6 / config.readout_events_per_s,
@@ -49,26 +52,29 @@ impl ReadOut {
         &mut self.waiting
     }
 
-    /// Reads out what is due by the end of the step; spikes in the inbox from index `first` on are new. Returns how many
-    /// were lost.
+    /// Reads out what is due by the end of the step; spikes in the inbox from index `first` on are new.
     pub(super) fn step(
         &mut self,
         first: usize,
         start_micros: i64,
         out: &mut Vec<Spike>,
         rng: &mut Xoshiro256PlusPlus,
-    ) -> u64 {
+    ) -> Dropped {
         for spike in &mut self.waiting[first..] {
             let deviation = rng.sample::<f64, _>(StandardNormal).clamp(-JITTER_LIMIT, JITTER_LIMIT);
             spike.micros += (self.latency + self.jitter * deviation).max(0.0) as i64;
         }
         self.order(start_micros);
         let end = start_micros + STEP_MICROS;
-        let mut lost = 0;
+        let mut dropped = Dropped::default();
         for &spike in &self.ordered {
+            if self.gate.as_mut().is_some_and(|gate| !gate.passes(&spike)) {
+                dropped.by_cap += 1;
+                continue;
+            }
             let start = self.free_micros.max(spike.micros as f64);
             if start - spike.micros as f64 > self.capacity * self.service_micros {
-                lost += 1;
+                dropped.by_queue += 1;
                 continue;
             }
             self.free_micros = start + self.service_micros;
@@ -76,7 +82,7 @@ impl ReadOut {
         }
         let due = self.queue.partition_point(|spike| spike.micros < end);
         out.extend(self.queue.drain(..due));
-        lost
+        dropped
     }
 
     /// Moves the spikes of this step from the inbox to `ordered`, by time; equal times keep their order. They all lie
