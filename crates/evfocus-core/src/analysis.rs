@@ -2,11 +2,11 @@
 
 use core::time::Duration;
 
-use crate::event::Geometry;
+use crate::event::{Geometry, Window};
 use crate::lens_trace::LensTrace;
 use crate::quality::SweepQuality;
 use crate::report::{Failure, LegReport};
-use crate::search::{Method, Searcher};
+use crate::search::{Method, Searcher, StructureAnswer, Travel};
 use crate::sweep::{Sweep, SweepRecorder};
 use crate::units::{CameraMicros, EventRate};
 
@@ -27,16 +27,70 @@ impl Default for SweepLimits {
     }
 }
 
-/// Analyzes sweeps. All memory is allocated at the start.
+/// What is asked of a sweep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Question {
+    /// The estimator that decides.
+    pub method: Method,
+    /// Accumulation interval of [`Method::ErFixed`].
+    pub interval: Duration,
+    /// What the sweep must hold.
+    pub limits: SweepLimits,
+    /// Whether every estimator is asked, whatever it costs; otherwise those that go beside `method`.
+    pub ask_all: bool,
+}
+
+impl Question {
+    /// Beside a measure that reads every event the others of its kind cost little more; beside the others they would be most of the
+    /// cost. The squared event rate runs only when asked for.
+    fn asks(&self, other: Method) -> bool {
+        let is_deciding = self.method == other;
+        match other {
+            Method::Egs | Method::EgsOfficial | Method::ErFixed => true,
+            Method::Structure | Method::MirrorPairs => {
+                self.ask_all || is_deciding || self.method.reads_every_event()
+            }
+            Method::ErSquared => self.ask_all || is_deciding,
+            Method::Auto => is_deciding,
+        }
+    }
+}
+
+/// Analyzes sweeps. All memory is allocated at the start, but for that of windows.
 #[derive(Debug, Clone)]
 pub struct Analyzer {
     searcher: Searcher,
+    has_begun: bool,
 }
 
 impl Analyzer {
     /// An analyzer for sweeps of sensors of `geometry`.
     pub fn new(geometry: Geometry) -> Self {
-        Self { searcher: Searcher::new(geometry) }
+        Self { searcher: Searcher::new(geometry), has_begun: false }
+    }
+
+    /// Looks at these windows of the picture too; the first [`MOST_WINDOWS`](crate::search::MOST_WINDOWS) count.
+    pub fn set_windows(&mut self, windows: impl Iterator<Item = Window> + Clone) {
+        self.searcher.structure().set_windows(windows);
+    }
+
+    /// Begins to take the events of a sweep along `travel` as they come, so that little is left to do at its end.
+    pub fn begin(&mut self, travel: Travel) {
+        self.searcher.structure().begin(travel);
+        self.has_begun = true;
+    }
+
+    /// Takes the events of `recorder` up to the newest position of `trace`.
+    pub fn take(&mut self, recorder: &SweepRecorder, trace: &LensTrace<CameraMicros>) {
+        if let (true, Some((newest, _))) = (self.has_begun, trace.last()) {
+            self.searcher.structure().take(recorder.store(), trace, newest);
+        }
+    }
+
+    /// Whether the lens has gone far enough beyond the peak that the answer will not change any more; always `false` for a sweep that
+    /// was not begun.
+    pub fn has_passed_peak(&mut self) -> bool {
+        self.has_begun && self.searcher.structure().has_passed_peak()
     }
 
     /// Writes what `recorder` counted and what every estimator says of it into `report`, whose `lost` is given.
@@ -47,11 +101,11 @@ impl Analyzer {
         &mut self,
         recorder: &SweepRecorder,
         trace: &LensTrace<CameraMicros>,
-        method: Method,
-        interval: Duration,
-        limits: SweepLimits,
+        question: Question,
         report: &mut LegReport,
     ) -> Result<(), Failure> {
+        let has_begun = core::mem::take(&mut self.has_begun);
+        let limits = question.limits;
         let sweep = describe(recorder, trace, report);
         let counted = report.on + report.off;
         let too_few = Failure::TooFewEvents { events: counted, needed: limits.fewest_events };
@@ -61,13 +115,25 @@ impl Analyzer {
         let sweep = sweep.ok_or(too_few)?;
         let quality = SweepQuality::of(&sweep).map_err(|error| Failure::NoAnswer(error.into()))?;
         report.quality = quality;
-        for other in Method::ALL {
-            // The cost of these grows with the number of events; they run only when they are what was asked for.
-            if !other.reads_every_event() || method == other {
-                let said = self.searcher.search(other, &sweep, interval);
-                if let Some(place) = report.estimates.get_mut(other as usize) {
-                    *place = Some(said);
-                }
+        if question.asks(Method::Structure) {
+            if !has_begun {
+                self.searcher.structure().begin(Travel::of(&sweep).map_err(Failure::NoAnswer)?);
+            }
+            self.ask_structure(&sweep, report);
+        }
+        for other in Method::ALL.into_iter().filter(|&other| question.asks(other)) {
+            let said = match other {
+                Method::Structure | Method::Auto => report
+                    .structure
+                    .map(|said| said.as_ref().map(StructureAnswer::estimate).map_err(|&error| error)),
+                Method::Egs
+                | Method::EgsOfficial
+                | Method::ErFixed
+                | Method::ErSquared
+                | Method::MirrorPairs => Some(self.searcher.search(other, &sweep, question.interval)),
+            };
+            if let Some(place) = report.estimates.get_mut(other as usize) {
+                *place = said;
             }
         }
         // The most telling reason first: lamps fill the link, and what fills the link is lost.
@@ -83,9 +149,19 @@ impl Analyzer {
         if quality.is_flat() {
             return Err(Failure::Flat);
         }
-        match report.estimate(method) {
-            Some(Err(error)) => Err(Failure::NoAnswer(error)),
-            Some(Ok(_)) | None => Ok(()),
+        let is_windowed = report.windows.iter().any(Option::is_some);
+        match report.estimate(question.method) {
+            Some(Err(error)) if !is_windowed => Err(Failure::of_search(error)),
+            Some(_) | None => Ok(()),
+        }
+    }
+
+    fn ask_structure(&mut self, sweep: &Sweep<'_>, report: &mut LegReport) {
+        let structure = self.searcher.structure();
+        report.structure = Some(structure.answer(sweep));
+        let mut answers = structure.window_answers(sweep);
+        for place in &mut report.windows {
+            *place = answers.next();
         }
     }
 }

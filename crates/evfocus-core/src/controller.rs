@@ -26,12 +26,13 @@ mod sweeping;
 
 pub use config::{ControllerConfig, OnFailure};
 pub use interface::{Action, DeviceFailure, FocusState, Input, Snapshot};
-pub use request::{Accepted, Command, FocusRequest, Mode, Refusal};
+pub use request::{Accepted, Command, FocusRequest, Mode, Pace, Refusal};
 
 use alloc::vec::Vec;
 use core::time::Duration;
 
 use crate::clock_map::{ClockEvent, ClockMap};
+use crate::delay::DelayModel;
 use crate::event::{EventBatch, Geometry};
 use crate::lens_trace::LensSample;
 use crate::report::{Failure, Outcome, Phase, RunId, RunReport};
@@ -74,6 +75,8 @@ pub struct Controller {
     run: Option<Run>,
     report: Option<RunReport>,
     clock: ClockMap,
+    delays: DelayModel,
+    geometry: Geometry,
     sweep: SweepState,
     lens: Option<LensSample>,
     camera_heard: HostMicros,
@@ -98,6 +101,8 @@ impl Controller {
             run: None,
             report: None,
             clock: ClockMap::new(None),
+            delays: config.delays,
+            geometry,
             sweep: SweepState::new(geometry, &config),
             lens: None,
             camera_heard: now,
@@ -125,6 +130,11 @@ impl Controller {
     /// The record of the last run that ended.
     pub fn report(&self) -> Option<&RunReport> {
         self.report.as_ref()
+    }
+
+    /// How late the pixels of this rig are, as far as its runs have taught.
+    pub fn delays(&self) -> DelayModel {
+        self.delays
     }
 
     /// How camera time and host time are related.
@@ -208,7 +218,7 @@ impl Controller {
         if self.mode == Mode::Manual {
             return Err(Refusal::ManualMode);
         }
-        let plan = request.resolve(&self.config)?;
+        let plan = request.resolve(&self.config, self.geometry)?;
         if let Some(run) = &self.run {
             let same = run.plan == plan || request == FocusRequest::default();
             return if same { Ok(Accepted::UnderWay(run.id)) } else { Err(Refusal::Busy { run: run.id }) };
@@ -225,6 +235,7 @@ impl Controller {
         self.camera_heard = now;
         self.lens_heard = now;
         self.sweep.forget();
+        self.sweep.set_windows(&plan.windows);
         if self.homed {
             self.go_to_start(now, actions);
         } else {
@@ -333,7 +344,7 @@ impl Controller {
                     self.fail(Failure::ClockUnusable, now, actions);
                 } else {
                     self.sweep.feed(batch, reached);
-                    self.sweep.extend_live_curve(&self.clock, reached);
+                    self.sweep.extend_live_curve(reached);
                 }
             }
             State::Idle
@@ -355,7 +366,7 @@ impl Controller {
         self.lens_heard = now;
         match self.state {
             State::Idle | State::Resting { .. } | State::Verifying { .. } => {}
-            State::Draining { .. } => self.sweep.add_lens(&sample),
+            State::Draining { .. } => self.sweep.add_lens(&sample, &self.clock),
             State::Moving(mut motion) => match motion.observe(&sample) {
                 Progress::UnderWay => self.state = State::Moving(motion),
                 Progress::Arrived => self.enter(State::Idle, now),
@@ -383,9 +394,15 @@ impl Controller {
                 Progress::Overdue => self.fail(Failure::TimedOut(Phase::ToStart), now, actions),
             },
             State::Sweeping { leg, mut motion } => {
-                self.sweep.add_lens(&sample);
+                self.sweep.add_lens(&sample, &self.clock);
                 match motion.observe(&sample) {
-                    Progress::UnderWay => self.state = State::Sweeping { leg, motion },
+                    Progress::UnderWay => {
+                        if leg == 0 && !motion.is_stopping() && self.may_stop_early() {
+                            actions.push(Action::StopLens);
+                            motion = motion.stop(now);
+                        }
+                        self.state = State::Sweeping { leg, motion };
+                    }
                     Progress::Arrived => self.drain(leg, &sample, now, actions),
                     Progress::Failed(failure) => self.fail(failure, now, actions),
                     Progress::Overdue => {

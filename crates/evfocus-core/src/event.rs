@@ -60,6 +60,41 @@ impl Geometry {
     }
 }
 
+/// A rectangle of pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Window {
+    /// Its first column.
+    pub x: u16,
+    /// Its first row.
+    pub y: u16,
+    /// Columns.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+}
+
+impl Window {
+    /// The whole of a sensor.
+    pub fn whole(geometry: Geometry) -> Self {
+        Self { x: 0, y: 0, width: geometry.width, height: geometry.height }
+    }
+
+    /// Column and row within the window of the sensor's column `x`, row `y`; `None` outside.
+    pub fn place_of(self, x: u16, y: u16) -> Option<(u16, u16)> {
+        // What lies before the window wraps round to beyond it.
+        let (column, row) = (x.wrapping_sub(self.x), y.wrapping_sub(self.y));
+        (column < self.width && row < self.height).then_some((column, row))
+    }
+
+    /// Whether it has pixels and all of them are on a sensor of `geometry`.
+    pub fn fits(self, geometry: Geometry) -> bool {
+        let ends_within = |start: u16, size: u16, limit: u16| {
+            size > 0 && u32::from(start) + u32::from(size) <= u32::from(limit)
+        };
+        ends_within(self.x, self.width, geometry.width) && ends_within(self.y, self.height, geometry.height)
+    }
+}
+
 /// Events that reached the host together. The batch is lent to the decoder, filled, consumed, and lent again, so that its
 /// memory is allocated once.
 #[derive(Debug, Clone, Default)]

@@ -134,6 +134,13 @@ impl<T: Timestamp> LensTrace<T> {
         self.samples.back().copied()
     }
 
+    /// The last sample at or before `time`, and the first one after it.
+    pub fn around(&self, time: T) -> [Option<(T, LensPosition)>; 2] {
+        let after = self.samples.partition_point(|&(sampled, _)| sampled <= time);
+        let before = after.checked_sub(1).and_then(|index| self.samples.get(index));
+        [before.copied(), self.samples.get(after).copied()]
+    }
+
     /// All samples, oldest first.
     pub fn samples(&self) -> impl DoubleEndedIterator<Item = (T, LensPosition)> + '_ {
         self.samples.iter().copied()

@@ -15,8 +15,10 @@ mod clock_map;
 pub mod controller;
 mod counter;
 mod curve;
+mod delay;
 mod event;
 mod event_store;
+mod flags;
 mod hot_pixels;
 mod lens_trace;
 mod measure;
@@ -26,19 +28,23 @@ pub mod search;
 mod sweep;
 mod units;
 
-pub use analysis::{Analyzer, SweepLimits};
-pub use answer::{Combined, combine, is_at_edge};
+pub use analysis::{Analyzer, Question, SweepLimits};
+pub use answer::{Answer, Prefer, Rules, UnknownPreference, answer, is_at_edge};
 pub use clock_map::{ClockEvent, ClockMap, ClockMapQuality, NoClockYet};
 pub use controller::{Controller, ControllerConfig};
 pub use counter::{CounterError, CumulativeCounter, EventCounts};
 pub use curve::{CurvePoint, FocusCurve};
-pub use event::{Event, EventBatch, Geometry, Polarity};
+pub use delay::{Delay, DelayModel};
+pub use event::{Event, EventBatch, Geometry, Polarity, Window};
 pub use event_store::EventStore;
+pub use flags::{Flag, Flags};
 pub use hot_pixels::HotPixels;
 pub use lens_trace::{Leg, LensSample, LensTrace, LensTraceError};
 pub use measure::{PixelCounts, event_rate};
 pub use quality::SweepQuality;
-pub use report::{Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport};
+pub use report::{
+    Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport, Suspicion, Windows,
+};
 pub use search::{Estimate, Method, SearchError, Searcher};
 pub use sweep::{HOLD, Sweep, SweepCapacity, SweepRecorder};
 pub use units::{

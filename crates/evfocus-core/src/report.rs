@@ -3,10 +3,12 @@
 use core::fmt;
 use core::time::Duration;
 
+use crate::answer::{Answer, Prefer};
 use crate::clock_map::ClockMapQuality;
 use crate::curve::FocusCurve;
+use crate::event::Window;
 use crate::quality::SweepQuality;
-use crate::search::{Estimate, Method, SearchError};
+use crate::search::{Estimate, MOST_WINDOWS, Method, SearchError, StructureAnswer};
 use crate::units::{CameraMicros, EventRate, HostMicros, LensPosition, LensRange, LensSpeed};
 
 /// Number of a run, counted from 1 by the daemon over its lifetime.
@@ -41,7 +43,16 @@ pub struct FocusPlan {
     pub speed: LensSpeed,
     /// One way or both.
     pub directions: Directions,
+    /// Whether a sweep ends once the answer cannot change any more, for methods that can tell.
+    pub early_stop: bool,
+    /// The windows to focus on; the whole picture if there are none.
+    pub windows: Windows,
+    /// Which of several answers counts.
+    pub prefer: Prefer,
 }
+
+/// The windows of a plan: at most [`MOST_WINDOWS`].
+pub type Windows = [Option<Window>; MOST_WINDOWS];
 
 /// What a run is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +107,28 @@ impl Phase {
     }
 }
 
+/// What a disagreement of the two directions looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Suspicion {
+    /// The way back lags behind its reported positions: play between motor and glass.
+    Backlash,
+    /// Positions are reported later than the lens was there.
+    LatePositions,
+    /// The two sweeps saw different peaks: the scene changed, or it has no single one.
+    DifferentPeaks,
+}
+
+impl Suspicion {
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Backlash => "backlash",
+            Self::LatePositions => "late-positions",
+            Self::DifferentPeaks => "different-peaks",
+        }
+    }
+}
+
 /// Why a run ended without focus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Failure {
@@ -105,6 +138,18 @@ pub enum Failure {
         events: u64,
         /// Events needed.
         needed: u64,
+    },
+    /// No lens position makes the picture sharper by more than chance does.
+    Weak {
+        /// How high the highest peak is in units of what chance makes.
+        significance: f64,
+    },
+    /// There is a peak, but different readings of the same events put it at different places.
+    Unsure {
+        /// The answer.
+        position: LensPosition,
+        /// One standard deviation, counts.
+        error_bar: f64,
     },
     /// The event rate does not depend on the lens position.
     Flat,
@@ -133,6 +178,8 @@ pub enum Failure {
         forward: LensPosition,
         /// Answer of the second.
         backward: LensPosition,
+        /// What it looks like.
+        suspicion: Suspicion,
     },
     /// The search had no answer.
     NoAnswer(SearchError),
@@ -163,10 +210,26 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// The failure that a search without an answer is.
+    pub fn of_search(error: SearchError) -> Self {
+        match error {
+            SearchError::Weak { significance } => Self::Weak { significance },
+            error @ (SearchError::NoLength { .. }
+            | SearchError::IntervalTooLong { .. }
+            | SearchError::EventsNotKept { .. }
+            | SearchError::NoTravel { .. }
+            | SearchError::NoPairs
+            | SearchError::Counter(_)
+            | SearchError::Trace(_)) => Self::NoAnswer(error),
+        }
+    }
+
     /// Its name in reports, on the socket and in exit messages.
     pub fn name(&self) -> &'static str {
         match self {
             Self::TooFewEvents { .. } => "too-few-events",
+            Self::Weak { .. } => "weak",
+            Self::Unsure { .. } => "unsure",
             Self::Flat => "flat",
             Self::Saturated => "saturated",
             Self::EventsLost { .. } => "events-lost",
@@ -210,6 +273,11 @@ impl fmt::Display for Failure {
                 f,
                 "the sweep made {events} events, {needed} are needed: take the lens cap off, give light or texture"
             ),
+            Self::Weak { significance } => SearchError::Weak { significance: *significance }.fmt(f),
+            Self::Unsure { position, error_bar } => write!(
+                f,
+                "the peak at {position} is uncertain by {error_bar:.0} counts: too much changes in view; keep the scene still or use a window"
+            ),
             Self::Flat => f.write_str(
                 "the event rate does not depend on the lens position: nothing with texture is in view",
             ),
@@ -226,10 +294,14 @@ impl fmt::Display for Failure {
             Self::PeakAtEdge { position } => {
                 write!(f, "the sharpest position, {position}, is at the edge of the range: widen the range")
             }
-            Self::DirectionMismatch { forward, backward } => write!(
-                f,
-                "the way there says {forward}, the way back {backward}: more than lag and backlash explain"
-            ),
+            Self::DirectionMismatch { forward, backward, suspicion } => {
+                write!(f, "the way there says {forward}, the way back {backward}, more than the pixels' delay explains: ")?;
+                f.write_str(match suspicion {
+                    Suspicion::Backlash => "the lens has play; sweep one way only (speed fast)",
+                    Suspicion::LatePositions => "positions are reported too late; set the lens's latency",
+                    Suspicion::DifferentPeaks => "the scene changed between the two; try again",
+                })
+            }
             Self::NoAnswer(error) => write!(f, "the search has no answer: {error}"),
             Self::LensNotMoving => {
                 f.write_str("the lens was told to move and did not: check its power and its limits")
@@ -296,6 +368,10 @@ pub struct LegReport {
     pub quality: SweepQuality,
     /// What every estimator said; `None` for those not asked.
     pub estimates: [Option<Result<Estimate, SearchError>>; Method::ALL.len()],
+    /// What the fine structure of the whole picture says; `None` if it was not asked.
+    pub structure: Option<Result<StructureAnswer, SearchError>>,
+    /// The same of each window of the request.
+    pub windows: [Option<(Window, Result<StructureAnswer, SearchError>)>; MOST_WINDOWS],
     /// The focus curve.
     pub curve: FocusCurve,
 }
@@ -315,6 +391,8 @@ impl LegReport {
             peak_rate: EventRate(0.0),
             quality: SweepQuality::default(),
             estimates: [None; Method::ALL.len()],
+            structure: None,
+            windows: [None; MOST_WINDOWS],
             curve: FocusCurve::new(),
         }
     }
@@ -342,6 +420,8 @@ pub struct RunReport {
     pub position_after: LensPosition,
     /// How it ended.
     pub outcome: Outcome,
+    /// What the sweeps said; `None` if they gave no answer.
+    pub answer: Option<Answer>,
     /// The sweeps made: none, the first, or both.
     pub legs: [Option<LegReport>; 2],
     /// Half the difference of the two directions' answers as a time at the sweep's speed, microseconds: lag plus backlash.

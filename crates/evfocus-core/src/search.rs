@@ -3,6 +3,7 @@
 mod egs;
 mod egs_official;
 mod er_fixed;
+mod mirror_pairs;
 mod structure;
 
 use core::fmt;
@@ -17,9 +18,13 @@ use crate::sweep::Sweep;
 use crate::units::LensPosition;
 
 pub use egs::{Comparison, GOLDEN_RATIO, MAX_ITERATIONS, STOP_INTERVAL_US, golden_search};
-pub use structure::{Apex, ApexFinder, LEAST_SIGNIFICANCE, StructureKernel, TravelStep};
+pub use structure::{
+    Apex, ApexFinder, Bookings, Filter, LEAST_SIGNIFICANCE, MOST_WINDOWS, NoiseMeter, Reading,
+    StructureAnswer, StructureKernel, StructureMeasure, TileAnswer, TileSet, Travel, TravelStep,
+};
 
-use structure::StructureSearch;
+use mirror_pairs::MirrorPairs;
+pub(crate) use structure::StructureSearch;
 
 /// A focus measure together with the search that looks for its maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -34,12 +39,23 @@ pub enum Method {
     ErSquared,
     /// The highest energy of the fine structure of the picture that the events add up to.
     Structure,
+    /// The middle between the two places of the lens at which pixels were equally bright.
+    MirrorPairs,
+    /// `structure`, with everything that speaks against its answer.
+    Auto,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: [Self; 5] =
-        [Self::Egs, Self::EgsOfficial, Self::ErFixed, Self::ErSquared, Self::Structure];
+    pub const ALL: [Self; 7] = [
+        Self::Egs,
+        Self::EgsOfficial,
+        Self::ErFixed,
+        Self::ErSquared,
+        Self::Structure,
+        Self::MirrorPairs,
+        Self::Auto,
+    ];
 
     /// The name users know it by.
     pub fn name(self) -> &'static str {
@@ -49,6 +65,8 @@ impl Method {
             Self::ErFixed => "er-fixed",
             Self::ErSquared => "er-squared",
             Self::Structure => "structure",
+            Self::MirrorPairs => "mirror-pairs",
+            Self::Auto => "auto",
         }
     }
 
@@ -57,7 +75,7 @@ impl Method {
     pub fn reads_every_event(self) -> bool {
         match self {
             Self::Egs | Self::EgsOfficial | Self::ErFixed => false,
-            Self::ErSquared | Self::Structure => true,
+            Self::ErSquared | Self::Structure | Self::MirrorPairs | Self::Auto => true,
         }
     }
 }
@@ -70,7 +88,7 @@ impl fmt::Display for Method {
 
 /// A method name that is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("no such method; use one of egs, egs-official, er-fixed, er-squared, structure")]
+#[error("no such method; use one of egs, egs-official, er-fixed, er-squared, structure, mirror-pairs, auto")]
 pub struct UnknownMethod;
 
 impl FromStr for Method {
@@ -135,6 +153,9 @@ pub enum SearchError {
         /// How high the highest peak is in units of what chance makes.
         significance: f64,
     },
+    /// Too few pixels were equally bright twice.
+    #[error("no two sides of a peak: too few pixels went there and came back")]
+    NoPairs,
     /// The counter does not cover the sweep.
     #[error(transparent)]
     Counter(#[from] CounterError),
@@ -148,12 +169,21 @@ pub enum SearchError {
 pub struct Searcher {
     pixel_counts: PixelCounts,
     structure: StructureSearch,
+    mirror_pairs: MirrorPairs,
 }
 
 impl Searcher {
     /// A searcher for sweeps of sensors of `geometry`.
     pub fn new(geometry: Geometry) -> Self {
-        Self { pixel_counts: PixelCounts::new(geometry), structure: StructureSearch::new(geometry) }
+        Self {
+            pixel_counts: PixelCounts::new(geometry),
+            structure: StructureSearch::new(geometry),
+            mirror_pairs: MirrorPairs::new(geometry),
+        }
+    }
+
+    pub(crate) fn structure(&mut self) -> &mut StructureSearch {
+        &mut self.structure
     }
 
     /// Looks for the sharpest moment of `sweep`. `interval` is the accumulation interval of [`Method::ErFixed`] (the paper
@@ -175,7 +205,11 @@ impl Searcher {
             Method::ErSquared => egs::search_squared(sweep, &mut self.pixel_counts),
             Method::EgsOfficial => egs_official::search(sweep),
             Method::ErFixed => er_fixed::search(sweep, interval),
-            Method::Structure => self.structure.search(sweep),
+            Method::Structure | Method::Auto => {
+                self.structure.begin(Travel::of(sweep)?);
+                Ok(self.structure.answer(sweep)?.estimate())
+            }
+            Method::MirrorPairs => self.mirror_pairs.search(sweep),
         }
     }
 }

@@ -2,8 +2,10 @@
 
 use core::time::Duration;
 
+use super::request::Pace;
 use crate::analysis::SweepLimits;
-use crate::report::Directions;
+use crate::answer::{Prefer, Rules};
+use crate::delay::DelayModel;
 use crate::search::Method;
 use crate::sweep::SweepCapacity;
 use crate::units::{LensRange, LensSpeed};
@@ -30,8 +32,18 @@ pub struct ControllerConfig {
     pub method: Method,
     /// Accumulation interval of [`Method::ErFixed`] unless the request names one.
     pub interval: Duration,
-    /// One sweep or two.
-    pub directions: Directions,
+    /// How thorough a run is unless the request says.
+    pub pace: Pace,
+    /// Which of several answers counts unless the request says.
+    pub prefer: Prefer,
+    /// Whether nearer subjects are sharp at higher positions.
+    pub nearest_is_high: bool,
+    /// An answer this near to the truth is as good as the truth, counts; 1 % of the range swept if that is more.
+    pub depth_of_focus: f64,
+    /// How late the pixels are, as far as is known beforehand.
+    pub delays: DelayModel,
+    /// By what part of its length the range is extended at an end where focus seems to lie beyond; 0 for not at all.
+    pub extension: f64,
     /// Whether the lens must be homed before its positions mean anything.
     pub needs_homing: bool,
     /// How long homing may take.
@@ -72,9 +84,14 @@ impl ControllerConfig {
             limits,
             max_speed,
             sweep_speed: max_speed,
-            method: Method::Egs,
+            method: Method::Auto,
             interval: Duration::from_millis(55),
-            directions: Directions::Both,
+            pace: Pace::Normal,
+            prefer: Prefer::Strongest,
+            nearest_is_high: true,
+            depth_of_focus: 0.0,
+            delays: DelayModel::default(),
+            extension: 0.25,
             needs_homing: false,
             homing_timeout: Duration::from_secs(30),
             rest: Duration::from_millis(100),
@@ -90,6 +107,20 @@ impl ControllerConfig {
             on_failure: OnFailure::Restore,
             capacity: SweepCapacity::default(),
             lens_samples: 60_000,
+        }
+    }
+
+    /// By what the answer of a run over `range` is judged, the pixels being as late as `delays` says.
+    pub(super) fn rules(&self, range: LensRange, prefer: Prefer, delays: DelayModel) -> Rules {
+        let rules = Rules::for_range(range);
+        Rules {
+            tolerance: rules.tolerance.max(self.depth_of_focus),
+            edge_share: self.edge_share,
+            largest_mismatch_share: self.largest_mismatch_share,
+            delays,
+            prefer,
+            nearest_is_high: self.nearest_is_high,
+            ..rules
         }
     }
 }

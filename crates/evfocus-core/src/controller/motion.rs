@@ -27,6 +27,8 @@ pub(super) struct Motion {
     moved: bool,
     stall_timeout: Duration,
     deadline: HostMicros,
+    /// When the lens was told to stop on its way: wherever it comes to rest then is where it was to go.
+    stopped: Option<HostMicros>,
 }
 
 impl Motion {
@@ -48,7 +50,17 @@ impl Motion {
             moved: false,
             stall_timeout: config.stall_timeout,
             deadline: now + expected.saturating_mul(2) + config.motion_slack,
+            stopped: None,
         }
+    }
+
+    /// The lens was told to stop where it is.
+    pub(super) fn stop(self, now: HostMicros) -> Self {
+        Self { stopped: Some(now), ..self }
+    }
+
+    pub(super) fn is_stopping(&self) -> bool {
+        self.stopped.is_some()
     }
 
     /// Judges by the time of the sample, not by when it was looked at: a host that was busy elsewhere is no fault of the lens.
@@ -57,6 +69,13 @@ impl Motion {
         if sample.position.distance(self.last_change.1) > self.tolerance / 2.0 {
             self.last_change = (now, sample.position);
             self.moved |= sample.position.distance(self.from) > self.tolerance;
+        }
+        if let Some(stopped) = self.stopped {
+            return match (sample.requested > stopped && !sample.moving, now >= self.deadline) {
+                (true, _) => Progress::Arrived,
+                (false, true) => Progress::Overdue,
+                (false, false) => Progress::UnderWay,
+            };
         }
         let missing = sample.position.distance(self.target);
         if missing <= self.tolerance && !sample.moving {

@@ -3,7 +3,9 @@
 use core::time::Duration;
 
 use super::ControllerConfig;
-use crate::report::{Directions, FocusPlan, RunId};
+use crate::answer::Prefer;
+use crate::event::{Geometry, Window};
+use crate::report::{Directions, FocusPlan, RunId, Windows};
 use crate::search::Method;
 use crate::units::{LensPosition, LensRange, LensSpeed};
 
@@ -14,6 +16,39 @@ pub enum Mode {
     Manual,
     /// The lens focuses when triggered, and never moves without a trigger.
     Auto,
+}
+
+/// How thorough a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Pace {
+    /// One sweep, which ends one width beyond the peak; the delay of the pixels is taken off by what is known of it.
+    Fast,
+    /// A sweep that ends beyond the peak, and the way back over it as the second one.
+    #[default]
+    Normal,
+    /// The whole range, both ways.
+    Accurate,
+}
+
+impl Pace {
+    /// Every pace.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Normal, Self::Accurate];
+
+    /// The name users know it by.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Normal => "normal",
+            Self::Accurate => "accurate",
+        }
+    }
+
+    fn directions(self) -> Directions {
+        match self {
+            Self::Fast => Directions::Forward,
+            Self::Normal | Self::Accurate => Directions::Both,
+        }
+    }
 }
 
 /// A focus run, as far as the caller cares; the configuration decides the rest.
@@ -27,8 +62,14 @@ pub struct FocusRequest {
     pub range: Option<LensRange>,
     /// Speed of the sweep.
     pub speed: Option<LensSpeed>,
-    /// One way or both.
+    /// How thorough.
+    pub pace: Option<Pace>,
+    /// One way or both, whatever the pace says.
     pub directions: Option<Directions>,
+    /// The windows to focus on; the whole picture if there are none.
+    pub windows: Windows,
+    /// Which of several answers counts.
+    pub prefer: Option<Prefer>,
 }
 
 /// Something the controller is told to do.
@@ -104,6 +145,33 @@ pub enum Refusal {
         /// What is kept, seconds.
         longest_s: f64,
     },
+    /// A window that is not on the sensor.
+    #[error(
+        "window {index} ({} x {} pixels at {}, {}) does not lie on the sensor of {} x {} pixels",
+        window.width, window.height, window.x, window.y, geometry.width, geometry.height
+    )]
+    Window {
+        /// Its number, from 0.
+        index: usize,
+        /// The window.
+        window: Window,
+        /// The sensor.
+        geometry: Geometry,
+    },
+    /// A window was preferred that the request does not have.
+    #[error("window {index} is preferred, and the request has {windows} windows, counted from 0")]
+    NoSuchWindow {
+        /// The number asked for, from 0.
+        index: u8,
+        /// How many there are.
+        windows: usize,
+    },
+    /// Windows with a method that counts the events of the whole picture.
+    #[error("method {method} counts the events of the whole picture; windows need auto or structure")]
+    NoWindows {
+        /// The method.
+        method: Method,
+    },
     /// An accumulation interval that does not fit the sweep.
     #[error("an interval of {interval_s} s must be above zero and shorter than the sweep's {sweep_s:.3} s")]
     Interval {
@@ -119,14 +187,21 @@ impl FocusRequest {
     ///
     /// # Errors
     /// [`Refusal`] if a value does not suit the lens or the room for counts.
-    pub fn resolve(&self, config: &ControllerConfig) -> Result<FocusPlan, Refusal> {
+    pub fn resolve(&self, config: &ControllerConfig, geometry: Geometry) -> Result<FocusPlan, Refusal> {
+        let pace = self.pace.unwrap_or(config.pace);
+        let prefer = self.prefer.unwrap_or(config.prefer);
         let plan = FocusPlan {
             method: self.method.unwrap_or(config.method),
             interval: self.interval.unwrap_or(config.interval),
             range: self.range.unwrap_or(config.limits),
             speed: self.speed.unwrap_or(config.sweep_speed),
-            directions: self.directions.unwrap_or(config.directions),
+            directions: self.directions.unwrap_or(pace.directions()),
+            // A nearer subject may come later than a stronger one.
+            early_stop: pace != Pace::Accurate && prefer != Prefer::Nearest,
+            windows: self.windows,
+            prefer,
         };
+        check_windows(&plan, geometry)?;
         for (what, end) in [("range start", plan.range.min()), ("range end", plan.range.max())] {
             if !config.limits.contains(end) {
                 return Err(Refusal::OutOfRange { what, value: end.0, limits: config.limits });
@@ -145,5 +220,24 @@ impl FocusRequest {
             return Err(Refusal::Interval { interval_s, sweep_s });
         }
         Ok(plan)
+    }
+}
+
+fn check_windows(plan: &FocusPlan, geometry: Geometry) -> Result<(), Refusal> {
+    let windows = plan.windows.iter().flatten();
+    if let Some((index, &window)) = windows.clone().enumerate().find(|(_, window)| !window.fits(geometry)) {
+        return Err(Refusal::Window { index, window, geometry });
+    }
+    let number = windows.count();
+    match plan.prefer {
+        Prefer::Window(index) if usize::from(index) >= number => {
+            Err(Refusal::NoSuchWindow { index, windows: number })
+        }
+        Prefer::Window(_) | Prefer::Strongest | Prefer::Nearest
+            if number > 0 && !matches!(plan.method, Method::Structure | Method::Auto) =>
+        {
+            Err(Refusal::NoWindows { method: plan.method })
+        }
+        Prefer::Window(_) | Prefer::Strongest | Prefer::Nearest => Ok(()),
     }
 }

@@ -5,13 +5,22 @@ use core::time::Duration;
 
 use super::motion::Motion;
 use super::{APPROACHES, Action, Controller, FocusState, OnFailure, State};
-use crate::answer::{combine, is_at_edge};
+use crate::answer::{Answer, answer};
+use crate::flags::Flag;
 use crate::lens_trace::LensSample;
 use crate::report::{Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport};
-use crate::units::{HostMicros, LensPosition, LensSpeed};
+use crate::search::{Method, Travel};
+use crate::units::{HostMicros, LensPosition, LensRange, LensSpeed};
 
 /// How far the link may be behind at the end of a sweep; a camera that is silent is given up sooner.
 const LINK_BACKLOG: Duration = Duration::from_secs(10);
+
+/// How often the range may be extended in one run.
+const MOST_EXTENSIONS: u32 = 3;
+/// An extension that the limits leave less than this part of is not worth a sweep.
+const LEAST_EXTENSION: f64 = 0.2;
+/// Delay for which the way back leaves room.
+const LONGEST_DELAY_S: f64 = 0.05;
 
 /// What belongs to the run under way.
 #[derive(Debug)]
@@ -23,7 +32,10 @@ pub(super) struct Run {
     pub(super) legs: [Option<LegReport>; 2],
     /// Reports waiting for their sweep, so that none is allocated between its start and its result.
     spare: [Option<LegReport>; 2],
-    delay_us: Option<f64>,
+    answer: Option<Answer>,
+    /// How far back the second sweep must go.
+    enough: Option<LensPosition>,
+    extensions: u32,
     phase_since: HostMicros,
     phases: [Duration; Phase::ALL.len()],
 }
@@ -37,7 +49,9 @@ impl Run {
             position_before,
             legs: [None, None],
             spare: [Some(LegReport::empty()), Some(LegReport::empty())],
-            delay_us: None,
+            answer: None,
+            enough: None,
+            extensions: 0,
             phase_since: now,
             phases: [Duration::ZERO; Phase::ALL.len()],
         }
@@ -50,27 +64,48 @@ impl Run {
         self.phase_since = now;
     }
 
-    /// Where the sweep of `leg` begins and ends.
-    fn ends(&self, leg: usize) -> (LensPosition, LensPosition) {
-        let range = self.plan.range;
-        if leg == 0 { (range.min(), range.max()) } else { (range.max(), range.min()) }
+    /// Half the difference of the two directions as a time.
+    fn delay_us(&self) -> Option<f64> {
+        let half_difference = self.answer.and_then(|found| found.half_difference)?;
+        Some(half_difference / self.plan.speed.counts_per_second() * 1e6)
     }
 
-    /// The answer of the sweeps made, or why there is none.
-    fn answer(&mut self, largest_mismatch_share: f64) -> Result<LensPosition, Failure> {
-        let estimate_of = |leg: &LegReport| match leg.estimate(self.plan.method) {
-            Some(Ok(estimate)) => Ok(estimate.position),
-            Some(Err(error)) => Err(Failure::NoAnswer(error)),
-            None => Err(Failure::NoAnswer(crate::SearchError::NoLength { at_us: leg.start.0 })),
-        };
-        let [Some(first), second] = &self.legs else {
-            return Err(Failure::TooFewEvents { events: 0, needed: 1 });
-        };
-        let forward = estimate_of(first)?;
-        let Some(second) = second else { return Ok(forward) };
-        let combined = combine(forward, estimate_of(second)?, self.plan.range, largest_mismatch_share)?;
-        self.delay_us = Some(combined.half_difference / self.plan.speed.counts_per_second() * 1e6);
-        Ok(combined.position)
+    /// Forgets the sweeps made, for others over `range`.
+    fn extend(&mut self, range: LensRange) {
+        self.plan.range = range;
+        self.extensions += 1;
+        self.enough = None;
+        self.legs = [None, None];
+        self.spare = [Some(LegReport::empty()), Some(LegReport::empty())];
+    }
+
+    /// Where the sweep of `leg` ends. The way back is over once it is one width past the peak, if it may end early.
+    fn end(&self, leg: usize) -> LensPosition {
+        let range = self.plan.range;
+        match (leg, self.enough) {
+            (0, _) => range.max(),
+            (_, Some(enough)) if self.plan.early_stop => range.clamp(enough),
+            (_, _) => range.min(),
+        }
+    }
+
+    /// The way by which positions are counted: as long as the range whatever part of it is swept, so that the first sweep and the way
+    /// back are cut into the same bins.
+    fn travel(&self, from: LensPosition, leg: usize) -> Option<Travel> {
+        let length = self.plan.range.length();
+        let to = LensPosition(if leg == 0 { from.0 + length } else { from.0 - length });
+        if self.plan.method.reads_every_event() { Travel::new(from, to).ok() } else { None }
+    }
+}
+
+/// What a sweep without an answer casts on the answer of the other one; nothing if that one is in question as well.
+fn doubt(failure: Failure) -> Option<Flag> {
+    if matches!(failure, Failure::Weak { .. }) {
+        Some(Flag::Weak)
+    } else if matches!(failure, Failure::Unsure { .. } | Failure::NoAnswer(_)) {
+        Some(Flag::Unsure)
+    } else {
+        None
     }
 }
 
@@ -97,21 +132,20 @@ impl Controller {
     }
 
     pub(super) fn go_to_start(&mut self, now: HostMicros, actions: &mut Vec<Action>) {
-        let Some((start, _)) = self.run.as_ref().map(|run| run.ends(0)) else { return };
+        let Some(start) = self.run.as_ref().map(|run| run.plan.range.min()) else { return };
         let motion = self.start_motion(start, self.config.max_speed, now, actions);
         self.enter(State::ToStart(motion), now);
     }
 
     pub(super) fn begin_sweep(&mut self, leg: usize, now: HostMicros, actions: &mut Vec<Action>) {
-        let Some((end, speed)) = self.run.as_ref().map(|run| (run.ends(leg).1, run.plan.speed)) else {
-            return;
-        };
+        let Some(run) = &self.run else { return };
         // Rest and silence checks have seen camera time, so the clock map can answer.
         let (Ok(origin), Some(sample)) = (self.clock.to_camera(now), self.lens) else {
             self.fail(Failure::CameraSilent, now, actions);
             return;
         };
-        self.sweep.begin(origin, &sample, now);
+        let (end, speed) = (run.end(leg), run.plan.speed);
+        self.sweep.begin(origin, &sample, run.travel(sample.position, leg), &self.clock, now);
         let motion = self.start_motion(end, speed, now, actions);
         self.enter(State::Sweeping { leg, motion }, now);
     }
@@ -137,34 +171,100 @@ impl Controller {
         let Some(run) = &mut self.run else { return };
         let Some(mut report) = run.spare.get_mut(leg).and_then(Option::take) else { return };
         let clock = self.clock.quality();
-        let mut verdict = self.sweep.search(&run.plan, &self.config, &self.clock, &mut report);
+        let mut verdict = self.sweep.search(&run.plan, &self.config, &mut report);
         if clock.residual_us > self.config.largest_clock_residual.as_micros() as f64 {
             verdict = Err(Failure::ClockUnusable);
         }
         if let Some(place) = run.legs.get_mut(leg) {
             *place = Some(report);
         }
-        let directions = run.plan.directions;
-        match (verdict, leg, directions) {
+        // A way back that says nothing leaves the answer of the way there.
+        let is_dispensable = leg == 1 && verdict.is_err_and(|failure| doubt(failure).is_some());
+        match (verdict, leg, run.plan.directions) {
+            (Err(_), _, _) if is_dispensable => self.decide(now, actions),
             (Err(failure), _, _) => self.fail(failure, now, actions),
-            (Ok(()), 0, Directions::Both) => self.begin_sweep(1, now, actions),
+            (Ok(()), 0, Directions::Both) => self.turn_round(now, actions),
             (Ok(()), _, _) => self.decide(now, actions),
         }
     }
 
+    /// Begins the way back, which need not go further than one width beyond the peak of the first sweep; with a margin for the delays of
+    /// both, which put the second peak further on.
+    fn turn_round(&mut self, now: HostMicros, actions: &mut Vec<Action>) {
+        if let (Ok(found), Some(run)) = (self.judge(), &mut self.run) {
+            let speed = run.plan.speed.counts_per_second();
+            let margin = found.width.map(|width| width + 2.0 * speed * LONGEST_DELAY_S);
+            let lowest = found.second_depth.map_or(found.position.0, |other| other.0.min(found.position.0));
+            run.enough = margin.map(|margin| LensPosition(lowest - margin));
+        }
+        self.begin_sweep(1, now, actions);
+    }
+
     fn decide(&mut self, now: HostMicros, actions: &mut Vec<Action>) {
-        let Some(run) = &mut self.run else { return };
-        let range = run.plan.range;
-        match run.answer(self.config.largest_mismatch_share) {
-            Err(failure) => self.fail(failure, now, actions),
-            Ok(answer) => {
-                if is_at_edge(answer, range, self.config.edge_share) {
-                    self.fail(Failure::PeakAtEdge { position: answer }, now, actions);
-                } else {
-                    self.approach(answer, 1, now, actions);
+        match self.judge() {
+            Err(Failure::PeakAtEdge { position }) => {
+                if !self.extend_range(position, now, actions) {
+                    self.fail(Failure::PeakAtEdge { position }, now, actions);
                 }
             }
+            Err(failure) => self.fail(failure, now, actions),
+            Ok(found) => {
+                let is_cut_off = found.flags.contains(Flag::Edge);
+                if is_cut_off && self.extend_range(found.position, now, actions) {
+                    return;
+                }
+                if let Some((noise_hz, delay)) = found.measured {
+                    self.delays.learn(noise_hz, delay.seconds, delay.uncertainty_s);
+                }
+                if let Some(run) = &mut self.run {
+                    run.answer = Some(found);
+                }
+                self.approach(found.position, 1, now, actions);
+            }
         }
+    }
+
+    /// What the sweeps made say; what the first one says alone, with a flag, if the second one says nothing.
+    fn judge(&self) -> Result<Answer, Failure> {
+        let no_sweep = Failure::TooFewEvents { events: 0, needed: self.config.sweep_limits.fewest_events };
+        let Some(Run { plan, legs: [Some(first), second], .. }) = &self.run else { return Err(no_sweep) };
+        let rules = self.config.rules(plan.range, plan.prefer, self.delays);
+        let both = answer(first, second.as_ref(), plan.method, &rules);
+        let knows_its_error = matches!(plan.method, Method::Structure | Method::Auto);
+        let doubt = both.err().filter(|_| knows_its_error && second.is_some()).and_then(doubt);
+        let Some(flag) = doubt else { return both };
+        let mut first = answer(first, None, plan.method, &rules)?;
+        first.flags.set(flag, true);
+        Ok(first)
+    }
+
+    /// Begins anew over a range that goes further at the end where `position` is; `false` if the lens cannot.
+    fn extend_range(&mut self, position: LensPosition, now: HostMicros, actions: &mut Vec<Action>) -> bool {
+        let Some(run) = &mut self.run else { return false };
+        let (range, limits) = (run.plan.range, self.config.limits);
+        let more = self.config.extension * range.length();
+        let is_low = position.distance(range.min()) < position.distance(range.max());
+        let (low, high) = (
+            range.min().0 - if is_low { more } else { 0.0 },
+            range.max().0 + if is_low { 0.0 } else { more },
+        );
+        let (low, high) = (limits.clamp(LensPosition(low)), limits.clamp(LensPosition(high)));
+        let Ok(extended) = LensRange::new(low, high) else { return false };
+        let seconds = extended.length() / run.plan.speed.counts_per_second();
+        let is_worth_it = extended.length() >= range.length() + LEAST_EXTENSION * more && more > 0.0;
+        let fits = seconds <= self.config.capacity.longest.as_secs_f64();
+        if run.extensions >= MOST_EXTENSIONS || !is_worth_it || !fits {
+            return false;
+        }
+        run.extend(extended);
+        self.go_to_start(now, actions);
+        true
+    }
+
+    /// Whether the first sweep has gone far enough beyond the peak.
+    pub(super) fn may_stop_early(&mut self) -> bool {
+        let Some(run) = &self.run else { return false };
+        run.plan.early_stop && run.plan.method.reads_every_event() && self.sweep.has_passed_peak()
     }
 
     /// A sweep that ends before its time leaves what it has counted in the report.
@@ -174,7 +274,7 @@ impl Controller {
         if let (Some(mut report), Some(place)) =
             (run.spare.get_mut(leg).and_then(Option::take), run.legs.get_mut(leg))
         {
-            self.sweep.report_unfinished(&self.clock, &mut report);
+            self.sweep.report_unfinished(&mut report);
             *place = Some(report);
         }
     }
@@ -279,8 +379,9 @@ impl Controller {
             position_before: run.position_before,
             position_after: self.lens.map_or(run.position_before, |sample| sample.position),
             outcome,
+            delay_us: run.delay_us(),
+            answer: run.answer,
             legs: run.legs,
-            delay_us: run.delay_us,
             hot_pixels: self.sweep.hot_pixels(),
             clock: self.clock.quality(),
             phases: run.phases,

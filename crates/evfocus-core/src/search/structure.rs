@@ -4,67 +4,206 @@
 //! fine structure as it is, blurring it lowers it. So the lens position at which that energy was highest is focus, in still scenes
 //! and in shaken ones. Every number here was settled on simulated sweeps of two public pixel models.
 //!
-//! What this is not: it says nothing of how far off it may be. The photoreceptor's delay stays in (about 6 ms in light, 15 to 50 ms in
-//! the dark, times the speed of the lens); sweeping both ways cancels it.
+//! The photoreceptor's delay stays in the raw answer: about 6 ms in light, 15 to 50 ms in the dark, times the speed of the lens.
+//! [`DelayModel`](crate::DelayModel) takes it off by the noise of the pixels; sweeping both ways cancels it.
 
 mod apex;
+mod bookings;
 mod kernel;
+mod measure;
+mod noise;
+mod reading;
 mod travel;
 
+use alloc::vec::Vec;
+
 use super::{Estimate, SearchError, all_events_kept};
-use crate::event::Geometry;
+use crate::event::{Geometry, Window};
+use crate::event_store::EventStore;
+use crate::lens_trace::LensTrace;
 use crate::sweep::Sweep;
+use crate::units::{CameraMicros, LensPosition};
 
 pub use apex::{Apex, ApexFinder};
+pub use bookings::{Bookings, Filter, TileSet};
 pub use kernel::{StructureKernel, TravelStep};
+pub use measure::{Reading, StructureMeasure};
+pub use noise::NoiseMeter;
+pub use reading::LEAST_SIGNIFICANCE;
+pub use travel::Travel;
 
-use travel::Travel;
+pub(super) use travel::LensCursor;
 
-/// An answer whose significance (see [`Apex::significance`]) is lower is none. Sweeps with their pixels shuffled stay below it.
-pub const LEAST_SIGNIFICANCE: f64 = 15.0;
+use reading::Found;
 
-/// Room for the search; allocated once.
+/// Most windows of a request.
+pub const MOST_WINDOWS: usize = 8;
+
+/// What one tile of the picture says.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TileAnswer {
+    /// Where it was sharpest, the delay of the pixels taken off as from the whole.
+    pub position: LensPosition,
+    /// How high its peak is in units of what chance makes.
+    pub significance: f64,
+    /// One standard deviation of the position, counts.
+    pub error_bar: f64,
+}
+
+/// What the energy of the fine structure says of one sweep. Positions have the delay of the pixels still in them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a finding of its own")]
+pub struct StructureAnswer {
+    /// Where the picture was sharpest.
+    pub position: LensPosition,
+    /// Full width of the peak at half its height, counts.
+    pub width: f64,
+    /// How high the peak is in units of what chance makes over its width.
+    pub significance: f64,
+    /// One standard deviation of the position, counts, the delay apart.
+    pub scatter: f64,
+    /// Noise of the pixels, events per second.
+    pub noise_hz: f64,
+    /// Speed of the lens there, counts per second; negative for the way down.
+    pub velocity: f64,
+    /// Where a good part of the picture was sharpest, if elsewhere.
+    pub rival: Option<LensPosition>,
+    /// The answer is from coarser structure, for the fine one was too weak.
+    pub is_coarse: bool,
+    /// The readings of the same events differ by a good part of the width.
+    pub is_unsure: bool,
+    /// The peak is cut off by an end of the sweep.
+    pub is_at_edge: bool,
+    /// The peak is wider than 40 % of the sweep.
+    pub is_flat: bool,
+    /// Each tile, row by row.
+    pub tiles: [TileAnswer; Bookings::TILES],
+    /// Passes over the events.
+    pub passes: u32,
+    /// When the lens was there, camera time in microseconds.
+    pub t_us: f64,
+    /// How long it was within the width, microseconds.
+    pub interval_us: f64,
+}
+
+impl StructureAnswer {
+    /// The same as every method's.
+    pub fn estimate(&self) -> Estimate {
+        let Self { position, t_us, passes, interval_us, .. } = *self;
+        Estimate { position, t_us, iterations: passes, interval_us }
+    }
+}
+
+/// A peak wider than this part of the sweep is no peak.
+const WIDEST: f64 = 0.4;
+/// An apex nearer to an end than this part of its width is cut off.
+const EDGE: f64 = 0.5;
+
+/// `structure` of the whole picture and of windows of it, as the events come in.
 #[derive(Debug, Clone)]
-pub(super) struct StructureSearch {
-    kernel: StructureKernel,
-    finder: ApexFinder,
+pub(crate) struct StructureSearch {
+    whole: StructureMeasure,
+    windows: Vec<StructureMeasure>,
 }
 
 impl StructureSearch {
-    pub(super) fn new(geometry: Geometry) -> Self {
-        Self { kernel: StructureKernel::new(geometry), finder: ApexFinder::new() }
+    pub(crate) fn new(geometry: Geometry) -> Self {
+        Self { whole: StructureMeasure::new(Window::whole(geometry)), windows: Vec::new() }
     }
 
-    /// `structure`: where along the sweep the energy was highest. Reads every event once, and once more if focus is near the
-    /// start, where the picture at the start is the wrong one to refer to.
-    pub(super) fn search(&mut self, sweep: &Sweep<'_>) -> Result<Estimate, SearchError> {
-        all_events_kept(sweep)?;
-        let travel = Travel::of(sweep)?;
-        self.kernel.begin();
-        for (event, step) in travel.events(sweep) {
-            self.kernel.take(&event, step);
+    /// Looks at these windows too, at most [`MOST_WINDOWS`]. Allocates their memory if they are not those of before.
+    pub(crate) fn set_windows(&mut self, windows: impl Iterator<Item = Window> + Clone) {
+        if !windows.clone().eq(self.windows.iter().map(StructureMeasure::window)) {
+            self.windows = windows.take(MOST_WINDOWS).map(StructureMeasure::new).collect();
         }
-        let mut apex = self.finder.find(self.kernel.growth());
-        let mut passes = 1;
-        if apex.at < apex.width {
-            self.kernel.begin_again();
-            for (event, step) in travel.events(sweep) {
-                self.kernel.take_again(&event, step);
-            }
-            apex = self.finder.find(self.kernel.growth());
-            passes = 2;
-        }
-        if apex.significance < LEAST_SIGNIFICANCE {
-            return Err(SearchError::Weak { significance: apex.significance });
-        }
-        let half_width = apex.width / 2.0;
-        let width_us =
-            travel.time_of(sweep, apex.at + half_width) - travel.time_of(sweep, apex.at - half_width);
-        Ok(Estimate {
-            position: travel.position_of(apex.at),
-            t_us: travel.time_of(sweep, apex.at),
-            iterations: passes,
-            interval_us: width_us,
-        })
+    }
+
+    pub(crate) fn begin(&mut self, travel: Travel) {
+        self.measures().for_each(|measure| measure.begin(travel));
+    }
+
+    pub(crate) fn take(&mut self, store: &EventStore, trace: &LensTrace<CameraMicros>, until: CameraMicros) {
+        self.measures().for_each(|measure| measure.take(store, trace, until));
+    }
+
+    fn measures(&mut self) -> impl Iterator<Item = &mut StructureMeasure> {
+        core::iter::once(&mut self.whole).chain(&mut self.windows)
+    }
+
+    /// The peak so far, of the whole picture or of the windows together.
+    pub(crate) fn has_passed_peak(&mut self) -> bool {
+        self.whole.has_passed_peak() && self.windows.iter_mut().all(StructureMeasure::has_passed_peak)
+    }
+
+    /// The answer of the whole picture.
+    pub(crate) fn answer(&mut self, sweep: &Sweep<'_>) -> Result<StructureAnswer, SearchError> {
+        answer(&mut self.whole, sweep)
+    }
+
+    /// The answers of the windows.
+    pub(crate) fn window_answers(
+        &mut self,
+        sweep: &Sweep<'_>,
+    ) -> impl Iterator<Item = (Window, Result<StructureAnswer, SearchError>)> {
+        self.windows.iter_mut().map(move |measure| (measure.window(), answer(measure, sweep)))
+    }
+}
+
+/// Reads the answer off `measure`, which has begun its sweep.
+fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<StructureAnswer, SearchError> {
+    all_events_kept(sweep)?;
+    measure.take(sweep.store, sweep.trace, sweep.end);
+    let nothing = SearchError::Weak { significance: 0.0 };
+    let travel = measure.travel().ok_or(nothing)?;
+    let first = measure.read(Reading::FIRST).ok_or(nothing)?;
+    // Near the start the picture at the start is the wrong one to compare with.
+    let (reference, passes) = if first.at < first.width { (1.0, 2) } else { (0.0, 1) };
+    if passes == 2 {
+        measure.take_again(sweep.store, sweep.trace);
+    }
+    let mut found = measure.read_all(Filter::Fine, reference).ok_or(nothing)?;
+    if !found.is_sound()
+        && let Some(coarse) = measure.read_all(Filter::Coarse, reference)
+        && (coarse.is_sound() || coarse.apex.significance > found.apex.significance)
+    {
+        found = coarse;
+    }
+    if found.apex.significance < LEAST_SIGNIFICANCE {
+        return Err(SearchError::Weak { significance: found.apex.significance });
+    }
+    Ok(in_counts(measure, &found, passes, travel, sweep))
+}
+
+fn in_counts(
+    measure: &StructureMeasure,
+    found: &Found,
+    passes: u32,
+    travel: Travel,
+    sweep: &Sweep<'_>,
+) -> StructureAnswer {
+    let Found { apex, filter, scatter, rival, tiles } = *found;
+    let counts = libm::fabs(travel.counts_per_bin());
+    let end = measure.bins_covered() as f64;
+    let Estimate { position, t_us, interval_us, .. } = travel.estimate(sweep, apex.at, apex.width, passes);
+    StructureAnswer {
+        position,
+        width: apex.width * counts,
+        significance: apex.significance,
+        scatter: scatter * counts,
+        noise_hz: measure.noise_hz(),
+        velocity: travel.velocity(sweep, apex.at, apex.width / 2.0),
+        rival: rival.map(|rival| travel.position_of(rival.at)),
+        is_coarse: filter == Filter::Coarse,
+        is_unsure: found.is_unsure(),
+        is_at_edge: apex.at.min(end - apex.at) < EDGE * apex.width,
+        is_flat: apex.width > WIDEST * Bookings::BINS as f64,
+        tiles: tiles.map(|tile| TileAnswer {
+            position: travel.position_of(tile.at),
+            significance: tile.significance,
+            error_bar: tile.error_bar() * counts,
+        }),
+        passes,
+        t_us,
+        interval_us,
     }
 }

@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
-use evfocus_core::controller::{Action, DeviceFailure, FocusState, Input, OnFailure};
-use evfocus_core::{ControllerConfig, Directions, Failure, Method, Outcome, Phase, SweepCapacity};
+use evfocus_core::controller::{Action, DeviceFailure, FocusState, Input, OnFailure, Pace};
+use evfocus_core::{ControllerConfig, Failure, Method, Outcome, Phase, SweepCapacity};
 
 use crate::rig::{CameraFault, LensFault, Rig, config};
 
@@ -28,7 +28,7 @@ fn fails(mut rig: Rig, at_phase: impl FnMut(&mut Rig, Phase), lens: Lens) -> Fai
 }
 
 fn forward() -> ControllerConfig {
-    ControllerConfig { directions: Directions::Forward, ..config() }
+    ControllerConfig { pace: Pace::Fast, ..config() }
 }
 
 /// A fault of the lens from `phase` on.

@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
-use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, FocusState, Input, Mode};
-use evfocus_core::{ControllerConfig, Directions, LensPosition, LensRange, Method, Outcome, Phase, RunId};
+use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, FocusState, Input, Mode, Pace};
+use evfocus_core::{ControllerConfig, LensPosition, LensRange, Method, Outcome, Phase, RunId};
 
 use Phase::{Approaching, Resting, Returning, Searching, Sweeping, ToStart, Verifying};
 
@@ -20,7 +20,7 @@ fn focused_at(rig: &Rig) -> f64 {
 
 #[test]
 fn one_way_goes_through_its_phases_in_order() {
-    let mut rig = Rig::new(ControllerConfig { directions: Directions::Forward, ..config() });
+    let mut rig = Rig::new(ControllerConfig { pace: Pace::Fast, ..config() });
     rig.focus();
     rig.finish(|_, _| {});
     let answer = focused_at(&rig);
@@ -52,8 +52,8 @@ fn both_ways_cancel_what_is_late() {
 #[test]
 fn the_last_approach_goes_in_the_direction_of_the_first_sweep() {
     // After a sweep forward the lens must go back further than the answer; after one back it comes from there anyway.
-    for (directions, run_up) in [(Directions::Forward, true), (Directions::Both, false)] {
-        let mut rig = Rig::new(ControllerConfig { directions, ..config() });
+    for (pace, run_up) in [(Pace::Fast, true), (Pace::Accurate, false)] {
+        let mut rig = Rig::new(ControllerConfig { pace, ..config() });
         rig.focus();
         rig.finish(|_, _| {});
         let target = |action: &Action| match action {
@@ -92,7 +92,11 @@ fn every_method_focuses() {
         let report = rig.controller.report().unwrap();
         for leg in report.sweeps() {
             for other in Method::ALL {
-                let asked = !other.reads_every_event() || other == method;
+                let asked = match other {
+                    Method::Egs | Method::EgsOfficial | Method::ErFixed => true,
+                    Method::Structure | Method::MirrorPairs => method.reads_every_event(),
+                    Method::ErSquared | Method::Auto => other == method,
+                };
                 assert_eq!(leg.estimate(other).is_some(), asked);
             }
         }

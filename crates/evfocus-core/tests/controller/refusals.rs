@@ -5,7 +5,7 @@ use core::time::Duration;
 use evfocus_core::controller::{Accepted, Command, DeviceFailure, FocusRequest, Input, Mode, Refusal};
 use evfocus_core::{Directions, LensPosition, LensRange, LensSpeed, Method, RunId};
 
-use crate::rig::{Rig, config};
+use crate::rig::{GEOMETRY, Rig, config};
 
 fn request(range: (f64, f64), speed: f64) -> FocusRequest {
     FocusRequest {
@@ -55,7 +55,7 @@ fn an_interval_must_fit_the_sweep_of_the_fixed_search_and_of_no_other() {
         let refusal = refused(&mut rig, Command::Focus(fixed));
         assert_eq!(refusal, Refusal::Interval { interval_s: interval.as_secs_f64(), sweep_s: 1.0 });
         let egs = FocusRequest { method: Some(Method::Egs), ..fixed };
-        assert!(egs.resolve(&config()).is_ok());
+        assert!(egs.resolve(&config(), GEOMETRY).is_ok());
     }
 }
 

@@ -3,15 +3,15 @@
 use core::f64::consts::TAU;
 use core::time::Duration;
 
-use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, Input, Refusal};
+use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, Input, Pace, Refusal};
 use evfocus_core::{
     CameraMicros, Controller, ControllerConfig, Event, EventBatch, Geometry, HostMicros, LensPosition,
-    LensRange, LensSample, LensSpeed, Outcome, Phase, Polarity, SweepCapacity,
+    LensRange, LensSample, LensSpeed, Method, Outcome, Phase, Polarity, SweepCapacity,
 };
 
 use crate::random::Xorshift;
 
-const GEOMETRY: Geometry = Geometry { width: 32, height: 24 };
+pub(crate) const GEOMETRY: Geometry = Geometry { width: 32, height: 24 };
 /// Host time minus camera time at the start, and what a transfer takes, microseconds.
 const CLOCK_OFFSET_US: i64 = 5_000_000;
 const DELAY_US: i64 = 300;
@@ -91,6 +91,9 @@ pub(crate) fn config() -> ControllerConfig {
         SweepCapacity { longest: Duration::from_secs(5), events: 200_000, ..SweepCapacity::default() };
     ControllerConfig {
         sweep_speed: LensSpeed::new(1_000.0).unwrap(),
+        // The scene of these tests is a rate first of all; what `auto` adds has tests of its own.
+        method: Method::Egs,
+        pace: Pace::Accurate,
         capacity,
         lens_samples: 4_000,
         ..ControllerConfig::for_lens(limits, LensSpeed::new(2_000.0).unwrap())
