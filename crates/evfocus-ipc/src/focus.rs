@@ -17,16 +17,53 @@ pub struct LensRange {
 /// How to focus. What is left out is taken from the daemon's configuration.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FocusRequest {
-    /// The search: `egs`, `egs-official`, `er-fixed`, `er-squared`, `structure`, ...; an unknown one is answered with the known ones.
+    /// The search: `auto`, `structure`, `egs`, ...; an unknown one is answered with the known ones.
     pub method: Option<String>,
     /// The positions to sweep, in counts.
     pub range: Option<LensRange>,
+    /// How thorough: `fast`, one sweep that ends beyond the peak; `normal`, the same and back over the peak; `accurate`, the whole
+    /// range both ways.
+    #[serde(default)]
+    pub speed: Option<String>,
     /// The speed of the sweep in counts per second.
     pub speed_counts_per_s: Option<f64>,
     /// The accumulation interval of the fixed-interval measures, in microseconds.
     pub interval_us: Option<u64>,
-    /// Which ways to sweep: `forward`, or `both` for there and back, which cancels lag and backlash.
+    /// Which ways to sweep, whatever the speed: `forward`, or `both` for there and back, which cancels lag and backlash.
     pub directions: Option<String>,
+    /// The windows of the picture to focus on, at most 8; the whole picture if there are none.
+    #[serde(default)]
+    pub windows: Vec<FocusWindow>,
+    /// Which of several windows or depths counts: `strongest`, `nearest`, or the number of a window, counted from 0.
+    #[serde(default)]
+    pub prefer: Option<String>,
+}
+
+/// A rectangle of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FocusWindow {
+    /// Its left edge.
+    pub x: f64,
+    /// Its upper edge.
+    pub y: f64,
+    /// From the left edge to the right one.
+    pub width: f64,
+    /// From the upper edge to the lower one.
+    pub height: f64,
+    /// Of all four; pixels if left out.
+    #[serde(default)]
+    pub unit: Option<WindowUnit>,
+}
+
+/// The unit of a window's numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WindowUnit {
+    /// Pixels; whole numbers.
+    Pixels,
+    /// Parts of the picture's width and height, 0 to 1.
+    Fraction,
 }
 
 /// News of a run. The last one has `done` and the report.

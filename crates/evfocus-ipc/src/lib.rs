@@ -21,16 +21,15 @@ mod report;
 mod request;
 pub mod server;
 mod status;
+mod sweep;
 
 pub use device::{Device, DeviceRole, DeviceState};
 pub use error::{Error, ProtocolError};
-pub use focus::{CurvePoint, FocusRequest, LensRange, Progress};
-pub use report::{
-    ClockMap, Curve, Direction, Estimate, EventCounts, Outcome, PhaseTiming, Quality, REPORT_FORMAT, Report,
-    RunDevices, Sweep,
-};
+pub use focus::{CurvePoint, FocusRequest, FocusWindow, LensRange, Progress, WindowUnit};
+pub use report::{ClockMap, EventCounts, Outcome, PhaseTiming, REPORT_FORMAT, Report, RigDelay, RunDevices};
 pub use request::{Reply, Request};
 pub use status::{LastRun, Mode, Phase, State, Status};
+pub use sweep::{Curve, Direction, Estimate, FocusMap, Quality, Structure, Sweep, WindowAnswer};
 
 /// The name of the interface.
 pub const INTERFACE: &str = "org.evfocus.Controller";

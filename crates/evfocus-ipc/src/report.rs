@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{FocusRequest, Phase, State};
+use crate::{FocusRequest, Phase, State, Sweep};
 
 /// The value of [`Report::format`] that this version writes. It grows only when a field changes its meaning or goes away;
 /// new fields do not count, readers ignore what they do not know.
@@ -30,6 +30,9 @@ pub struct Report {
     /// Half the difference of the two directions' answers, as a time at the sweep's speed, in microseconds: lag plus
     /// backlash. Nothing without two answers.
     pub delay_us: Option<f64>,
+    /// How late the pixels are, as far as the runs up to this one have taught.
+    #[serde(default)]
+    pub rig_delay: Option<RigDelay>,
     /// Hot pixels that were left out.
     pub hot_pixels: u64,
     /// The relation of the camera's clock to the host's; nothing if the run ended before one was known.
@@ -68,84 +71,38 @@ pub struct Outcome {
     pub lens_position: Option<f64>,
     /// Where the lens stood before the run, in counts.
     pub position_before: f64,
-    /// The estimator that decided.
+    /// The method asked for.
     pub method: Option<String>,
+    /// The estimator that decided; nothing without an answer.
+    #[serde(default)]
+    pub decided_by: Option<String>,
+    /// One standard deviation of the position, in counts; nothing if nothing is known of it.
+    #[serde(default)]
+    pub error_bar: Option<f64>,
+    /// The probability, 0 to 1, that the position is right to within the depth of focus, or 1 % of the range if that is more.
+    #[serde(default)]
+    pub confidence: Option<f64>,
+    /// What is odd about the answer, in kebab case: `saturated`, `two-depths`, `weak`, `unsure`, `edge`, `flat`, `flicker`,
+    /// `events-lost`, `coarse`. The report's warnings say what each means.
+    #[serde(default)]
+    pub flags: Vec<String>,
+    /// Where a good part of the picture is sharp beside the position, in counts.
+    #[serde(default)]
+    pub second_depth: Option<f64>,
+    /// The window that won, counted from 0; nothing without windows.
+    #[serde(default)]
+    pub window: Option<u64>,
 }
 
-/// One sweep of the lens, and what was read off it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Sweep {
-    /// Which way.
-    pub direction: Direction,
-    /// Where it began, in counts.
-    pub from: f64,
-    /// Where it ended, in counts.
-    pub to: f64,
-    /// Camera time at its start, in microseconds.
-    pub start_us: i64,
-    /// Camera time at its end, in microseconds.
-    pub end_us: i64,
-    /// The event rate along it.
-    pub curve: Curve,
-    /// What each estimator said, whether or not it decided.
-    pub estimators: Vec<Estimate>,
-    /// Whether its counts are fit to find focus with.
-    pub quality: Quality,
-}
-
-/// What the counts of a sweep look like.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Quality {
-    /// Share of the 5 ms windows whose rate is near the greatest, 0 to 1; above 0.3 the read-out or the link is the limit.
-    pub share_at_ceiling: f64,
-    /// Variance over mean of the counts in 0.2 ms bins of the busiest half: 1 for chance, below 0.1 a read-out limit.
-    pub regularity: f64,
-    /// Variance over mean of the counts in fiftieths of the sweep: below 2 the rate does not depend on the lens.
-    pub dispersion: f64,
-    /// The mains frequency at which the light flickers most, in Hz: 100 or 120; 0 if unknown.
-    pub flicker_hz: u64,
-    /// How much of the rate flickers, 0 to 2; above 0.3 it is a warning.
-    pub flicker_depth: f64,
-}
-
-/// The focus curve; all lists have the same length.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Curve {
-    /// Lens positions in counts.
-    pub position: Vec<f64>,
-    /// Events per second.
-    pub rate: Vec<f64>,
-    /// Camera times in microseconds.
-    pub t_us: Vec<i64>,
-}
-
-/// The direction of a sweep.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Direction {
-    /// The first sweep.
-    Forward,
-    /// The second sweep, the way back.
-    Backward,
-}
-
-/// What one estimator found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Its name, as in a request.
-    pub method: String,
-    /// [`State::Focused`] or [`State::Failed`].
-    pub state: State,
-    /// Why it found nothing, in words.
-    pub reason: Option<String>,
-    /// The position found, in counts.
-    pub position: Option<f64>,
-    /// Camera time of that position in the sweep, in microseconds.
-    pub t_us: Option<i64>,
-    /// Steps of the search.
-    pub iterations: u64,
-    /// Events that the answer rests on.
-    pub events: u64,
+/// How late the pixels are: `base_us` plus `us_per_hz` for each noise event that a pixel makes in a second.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RigDelay {
+    /// Of pixels without noise, in microseconds.
+    pub base_us: f64,
+    /// More for each Hz of noise, in microseconds.
+    pub us_per_hz: f64,
+    /// Sweeps there and back that it has been learnt from.
+    pub measurements: u64,
 }
 
 /// The relation of the two clocks: host = camera + offset, at the end of the run.

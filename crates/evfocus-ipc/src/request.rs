@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use crate::{Device, Error, FocusRequest, LensRange, Mode, Progress, Report, Status};
+use crate::{Device, Error, FocusRequest, FocusWindow, LensRange, Mode, Progress, Report, Status};
 
 /// Longest part of a wrong argument that is quoted back, in characters.
 const QUOTED_CHARS: usize = 100;
@@ -131,9 +131,12 @@ impl Arguments {
         Ok(FocusRequest {
             method: self.take("method")?,
             range: self.take::<Option<LensRange>>("range")?,
+            speed: self.take("speed")?,
             speed_counts_per_s: self.take("speed_counts_per_s")?,
             interval_us: self.take("interval_us")?,
             directions: self.take("directions")?,
+            windows: self.take::<Option<Vec<FocusWindow>>>("windows")?.unwrap_or_default(),
+            prefer: self.take("prefer")?,
         })
     }
 
@@ -160,6 +163,7 @@ fn invalid(name: &str, value: &Value, remedy: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::WindowUnit;
 
     fn parse(name: &str, json: &str) -> Result<Request, Error> {
         Request::parse(name, serde_json::from_str(json).unwrap()).unwrap()
@@ -168,10 +172,18 @@ mod tests {
     #[test]
     fn requests_survive_the_wire() {
         let range = Some(LensRange { min: 220.0, max: 3750.0 });
+        let unit = Some(WindowUnit::Fraction);
+        let window = FocusWindow { x: 0.25, y: 0.0, width: 0.5, height: 1.0, unit };
         for request in [
             Request::GetStatus,
             Request::Focus(FocusRequest::default()),
             Request::Focus(FocusRequest { method: Some("egs".into()), range, ..FocusRequest::default() }),
+            Request::Focus(FocusRequest {
+                speed: Some("fast".into()),
+                windows: vec![window],
+                prefer: Some("0".into()),
+                ..FocusRequest::default()
+            }),
             Request::Abort,
             Request::MoveTo { position: 1234.5 },
             Request::SetMode { mode: Mode::Manual },
@@ -196,6 +208,10 @@ mod tests {
             ("Focus", r#"{"range": {"min": 1, "max": 2, "step": 3}}"#, "range"),
             ("Focus", r#"{"interval_us": -1}"#, "interval_us"),
             ("Focus", r#"{"speed": 100}"#, "speed"),
+            ("Focus", r#"{"windows": "all"}"#, "windows"),
+            ("Focus", r#"{"windows": [{"x": 1, "y": 2, "width": 3}]}"#, "windows"),
+            ("Focus", r#"{"windows": [{"x": 1, "y": 2, "width": 3, "height": 4, "unit": "mm"}]}"#, "windows"),
+            ("Focus", r#"{"prefer": 1}"#, "prefer"),
             ("GetReport", r#"{"id": 1.5}"#, "id"),
             ("GetStatus", r#"{"verbose": true}"#, "verbose"),
         ] {

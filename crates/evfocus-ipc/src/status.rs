@@ -163,4 +163,13 @@ pub struct LastRun {
     pub position: Option<f64>,
     /// The named reason of a failure, in kebab case.
     pub reason: Option<String>,
+    /// One standard deviation of the position, in counts; nothing if nothing is known of it.
+    #[serde(default)]
+    pub error_bar: Option<f64>,
+    /// The probability, 0 to 1, that the position is right.
+    #[serde(default)]
+    pub confidence: Option<f64>,
+    /// What is odd about the answer, in kebab case.
+    #[serde(default)]
+    pub flags: Vec<String>,
 }
