@@ -2,6 +2,7 @@
 
 mod focus;
 mod simulation;
+mod value;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -12,6 +13,7 @@ use serde::Deserialize;
 
 pub use focus::FocusSection;
 pub use simulation::{FaultSection, SimulationSection};
+pub(crate) use value::BadValue;
 
 /// The file as written. Every key has a default; no file at all is the simulated rig.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -141,44 +143,6 @@ pub enum ConfigError {
     },
 }
 
-/// A value that makes no sense, before it is known which file it came from.
-#[derive(Debug)]
-pub(crate) struct BadValue {
-    key: String,
-    value: String,
-    remedy: String,
-}
-
-impl std::fmt::Display for BadValue {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} is {}: {}", self.key, self.value, self.remedy)
-    }
-}
-
-impl BadValue {
-    pub(crate) fn new(
-        key: impl Into<String>,
-        value: impl std::fmt::Display,
-        remedy: impl Into<String>,
-    ) -> Self {
-        Self { key: key.into(), value: format!("{value}"), remedy: remedy.into() }
-    }
-
-    /// `value`, if it lies within `min` and `max`.
-    pub(crate) fn check(key: &str, value: f64, min: f64, max: f64) -> Result<f64, Self> {
-        if value >= min && value <= max {
-            Ok(value)
-        } else {
-            Err(Self::new(key, value, format!("it must be from {min} to {max}")))
-        }
-    }
-
-    /// A duration from a number of `unit_s` seconds each.
-    pub(crate) fn duration(key: &str, value: f64, unit_s: f64, min: f64, max: f64) -> Result<Duration, Self> {
-        Ok(Duration::from_secs_f64(Self::check(key, value, min, max)? * unit_s))
-    }
-}
-
 impl Config {
     /// The configuration in the file at `path`.
     ///
@@ -263,7 +227,7 @@ impl Config {
         };
         // Against the simulated lens, and the default run against both, now rather than at the first run.
         let controller = config.controller(&hil_sim_lens(&config.rig))?;
-        FocusRequest::default().resolve(&controller).map_err(|refusal| {
+        FocusRequest::default().resolve(&controller, config.rig.sensor.geometry).map_err(|refusal| {
             let is_interval = matches!(refusal, Refusal::Interval { .. });
             let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
             BadValue::new(key, "not fit for a default run", refusal.to_string())

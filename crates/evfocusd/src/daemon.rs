@@ -19,6 +19,7 @@ use crate::devices::{self, Devices};
 use crate::handle::{Handle, Lookups};
 use crate::publisher::{Constants, PROGRESS, Publisher, Reports};
 use crate::reports::ReportStore;
+use crate::rig_delay::RigDelayFile;
 use crate::service;
 use crate::threads::camera::{BATCH_EVENTS, BATCHES, CameraThread};
 use crate::threads::control::{CURVE_POINTS, ControlThread, Publications, REPORTS};
@@ -92,7 +93,7 @@ struct Running {
 impl Running {
     fn start(config: &Config, devices: Devices, clock: &Arc<dyn Clock>) -> anyhow::Result<Self> {
         let (camera_info, lens_info) = (devices.camera.info(), devices.lens.info());
-        let settings = config
+        let mut settings = config
             .controller(&lens_info)
             .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
         let limits = settings.limits;
@@ -100,6 +101,12 @@ impl Running {
         if let Some(fault) = store.fault() {
             tracing::error!(%fault, "reports are kept in memory only");
         }
+        let run_devices = run_devices(&camera_info, &lens_info);
+        // Where another daemon keeps its reports, it keeps its delay too.
+        let rig_delay = (store.fault().is_none())
+            .then(|| RigDelayFile::new(&config.state_dir, &run_devices.camera, &run_devices.lens));
+        settings.delays = rig_delay.as_ref().and_then(RigDelayFile::read).unwrap_or_default();
+        let (saved_delays, pace) = (settings.delays, settings.pace);
         let mut controller = Controller::new(settings, camera_info.geometry, clock.now());
         controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
         if config.mode == Mode::Manual {
@@ -125,6 +132,8 @@ impl Running {
         let (ended_in, ended) = mpsc::channel(3);
         let control = ControlThread {
             controller,
+            geometry: camera_info.geometry,
+            pace,
             clock: Arc::clone(clock),
             filled: filled_out,
             empty: empty_in,
@@ -157,11 +166,6 @@ impl Running {
         let camera = spawn("evfocus-camera", &ended_in, move || camera.run())?;
         let lens = spawn("evfocus-lens", &ended_in, move || lens.run())?;
 
-        let run_devices = ipc::RunDevices {
-            camera: devices::name(&camera_info.model, &camera_info.serial),
-            lens: devices::name(&lens_info.model, &lens_info.serial),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-        };
         let lookups = DaemonLookups {
             camera: camera_info,
             lens: lens_info,
@@ -176,6 +180,8 @@ impl Running {
             status: status_in,
             progress: progress_in,
             store,
+            rig_delay,
+            saved_delays,
             constants: Constants { devices: run_devices, limits },
             clock: Arc::clone(clock),
         };
@@ -225,6 +231,14 @@ impl Running {
             bail!("panicked: {}; the lens is stopped; the log says where", panicked.join(", "));
         }
         Ok(())
+    }
+}
+
+fn run_devices(camera: &CameraInfo, lens: &LensInfo) -> ipc::RunDevices {
+    ipc::RunDevices {
+        camera: devices::name(&camera.model, &camera.serial),
+        lens: devices::name(&lens.model, &lens.serial),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
     }
 }
 

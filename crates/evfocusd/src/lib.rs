@@ -10,9 +10,13 @@ pub mod handle;
 pub mod logging;
 mod publisher;
 mod reports;
+mod rig_delay;
 pub mod service;
+mod storage;
+pub mod sweep_report;
 mod threads;
 pub mod virtual_rig;
+pub mod windows;
 mod wire;
 
 pub use config::{Config, ConfigError};

@@ -4,13 +4,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::controller::Snapshot;
-use evfocus_core::{CurvePoint, LensRange, RunId, RunReport};
+use evfocus_core::{CurvePoint, DelayModel, LensRange, RunId};
 use evfocus_hal::{Clock, unix_time};
 use evfocus_ipc::{self as ipc, Progress, Report, Status};
 use rtrb::Consumer;
 use tokio::sync::{broadcast, mpsc, watch};
 
 use crate::reports::ReportStore;
+use crate::rig_delay::RigDelayFile;
+use crate::threads::control::EndedRun;
 use crate::wire;
 
 /// Messages of a run that a follower may be behind: a sweep of 20 s at 50 points a second.
@@ -32,13 +34,17 @@ pub(crate) struct Publisher {
     /// From the control thread.
     pub(crate) curve: Consumer<(RunId, CurvePoint)>,
     /// From the control thread.
-    pub(crate) reports: mpsc::Receiver<Box<RunReport>>,
+    pub(crate) reports: mpsc::Receiver<Box<EndedRun>>,
     /// To the clients.
     pub(crate) status: watch::Sender<Arc<Status>>,
     /// To the clients.
     pub(crate) progress: broadcast::Sender<Arc<Progress>>,
     /// To the disk.
     pub(crate) store: Reports,
+    /// To the disk too; nothing if the state directory cannot be used.
+    pub(crate) rig_delay: Option<RigDelayFile>,
+    /// What is there.
+    pub(crate) saved_delays: DelayModel,
     /// What stays the same.
     pub(crate) constants: Constants,
     /// Host time.
@@ -141,20 +147,39 @@ impl Publisher {
         self.status.send_replace(Arc::new(self.status(&snapshot, news)));
     }
 
-    async fn publish_report(&mut self, run: &RunReport, news: &mut News) {
+    async fn publish_report(&mut self, ended: &EndedRun, news: &mut News) {
         let snapshot = *self.snapshots.borrow();
         self.send_curve(&snapshot);
         let circumstances = wire::Circumstances {
-            started_unix_s: unix_time().saturating_sub(self.clock.now().since(run.started)).as_secs_f64(),
+            started_unix_s: unix_time()
+                .saturating_sub(self.clock.now().since(ended.report.started))
+                .as_secs_f64(),
             devices: self.constants.devices.clone(),
         };
-        let report = Arc::new(wire::report(run, circumstances));
+        let report = Arc::new(wire::report(ended, circumstances));
         log(&report);
-        news.fault = keep(self.store.clone(), Arc::clone(&report)).await;
+        let fault = keep(self.store.clone(), Arc::clone(&report)).await;
+        let delay_fault = self.keep_delays(ended.delays).await;
+        news.fault = fault.or(delay_fault);
         news.last_run = Some(last_run(&report));
         self.status.send_replace(Arc::new(self.status(&snapshot, news)));
         let report = Some(Report::clone(&report));
-        self.send(Progress { done: true, report, ..progress(run.id, &snapshot, None) });
+        self.send(Progress { done: true, report, ..progress(ended.report.id, &snapshot, None) });
+    }
+
+    /// Writes what the runs have taught, if that is not on disk yet. Returns what went wrong.
+    async fn keep_delays(&mut self, delays: DelayModel) -> Option<String> {
+        let file = self.rig_delay.clone().filter(|_| delays != self.saved_delays)?;
+        let error = match tokio::task::spawn_blocking(move || file.write(&delays)).await {
+            Ok(Ok(())) => {
+                self.saved_delays = delays;
+                return None;
+            }
+            Ok(Err(error)) => error.to_string(),
+            Err(panic) => panic.to_string(),
+        };
+        tracing::warn!(%error, "the learnt delay of the pixels is kept in memory only");
+        Some(format!("the learnt delay of the pixels is kept in memory only: {error}"))
     }
 
     /// Sends the points of the live curve that have come; whether there were any.
@@ -243,6 +268,9 @@ fn last_run(report: &Report) -> ipc::LastRun {
         state: report.result.state,
         position: report.result.position,
         reason: report.result.reason.clone(),
+        error_bar: report.result.error_bar,
+        confidence: report.result.confidence,
+        flags: report.result.flags.clone(),
     }
 }
 
@@ -251,7 +279,10 @@ fn log(report: &Report) {
     let (run, elapsed_s) = (report.run_id, report.elapsed_s);
     let (events, lost) = (report.events.counted, report.events.lost);
     match (&report.result.reason, report.result.position) {
-        (None, Some(position)) => tracing::info!(run, position, events, lost, elapsed_s, "focused"),
+        (None, Some(position)) => {
+            let (error_bar, confidence) = (report.result.error_bar, report.result.confidence);
+            tracing::info!(run, position, error_bar, confidence, events, lost, elapsed_s, "focused");
+        }
         (reason, _) => {
             let reason = reason.as_deref().unwrap_or("unknown");
             tracing::info!(run, reason, message = %report.result.message, events, lost, elapsed_s, "not focused");

@@ -1,11 +1,13 @@
 //! The state directory: a JSON file for each run, written so that a reader sees all of it or nothing.
 
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use evfocus_ipc::{Error, Report};
+
+use crate::storage::{failed, write_json};
 
 const PREFIX: &str = "run-";
 const SUFFIX: &str = ".json";
@@ -43,32 +45,15 @@ impl ReportStore {
         self.directory.join(format!("{PREFIX}{id:08}{SUFFIX}"))
     }
 
-    /// Writes `report`: to a file of another name, which is made durable and then renamed.
+    /// Writes `report` whole or not at all.
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the file; what was there before stays.
     pub(crate) fn write(&self, report: &Report) -> Result<PathBuf, Error> {
         let path = self.path(report.run_id);
-        let temporary = path.with_extension("json.new");
-        let written = self.write_through(report, &temporary, &path);
-        if let Err(error) = written {
-            // What is left of the attempt takes room that is short; if even this fails there is nothing to add.
-            fs::remove_file(&temporary).unwrap_or_default();
-            return Err(failed(&path, &error));
-        }
+        write_json(&path, report)?;
         self.drop_oldest();
         Ok(path)
-    }
-
-    fn write_through(&self, report: &Report, temporary: &Path, path: &Path) -> io::Result<()> {
-        let mut file = File::create(temporary)?;
-        let mut json = serde_json::to_vec_pretty(report)?;
-        json.push(b'\n');
-        file.write_all(&json)?;
-        file.sync_all()?;
-        fs::rename(temporary, path)?;
-        // The new name must survive a power cut too.
-        File::open(&self.directory)?.sync_all()
     }
 
     /// The report of run `id`, or of the newest run that has one.
@@ -116,19 +101,4 @@ impl ReportStore {
             }
         }
     }
-}
-
-fn failed(path: &Path, error: &io::Error) -> Error {
-    const FULL: [io::ErrorKind; 3] =
-        [io::ErrorKind::StorageFull, io::ErrorKind::QuotaExceeded, io::ErrorKind::FileTooLarge];
-    const FORBIDDEN: [io::ErrorKind; 2] =
-        [io::ErrorKind::PermissionDenied, io::ErrorKind::ReadOnlyFilesystem];
-    let remedy = if FULL.contains(&error.kind()) {
-        "make room on that disk"
-    } else if FORBIDDEN.contains(&error.kind()) {
-        "let the daemon's user write there, or name another directory with --state-dir"
-    } else {
-        "check the directory, or name another one with --state-dir"
-    };
-    Error::StorageFailed { path: path.display().to_string(), message: format!("{error}; {remedy}") }
 }

@@ -8,7 +8,7 @@ use std::process::{Child, ChildStderr, Command, ExitStatus, Output, Stdio};
 
 use anyhow::{Context, Result, bail};
 use evfocus_ipc::client::Client;
-use evfocus_ipc::{FocusRequest, LensRange, Phase, Report, State};
+use evfocus_ipc::{FocusRequest, FocusWindow, LensRange, Phase, Report, State, WindowUnit};
 use tempfile::TempDir;
 
 const EVFOCUSD: &str = env!("CARGO_BIN_EXE_evfocusd");
@@ -18,6 +18,8 @@ struct Daemon {
     child: Child,
     log: BufReader<ChildStderr>,
     folder: Option<TempDir>,
+    /// What it had logged when it was ready.
+    started: String,
 }
 
 impl Drop for Daemon {
@@ -50,7 +52,7 @@ impl Daemon {
                 bail!("not ready: {seen}");
             }
         }
-        Ok(Self { child, log, folder: Some(folder) })
+        Ok(Self { child, log, folder: Some(folder), started: seen })
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -82,6 +84,17 @@ fn short() -> FocusRequest {
         directions: Some("forward".to_owned()),
         ..FocusRequest::default()
     }
+}
+
+/// The same there and back, which teaches the delay of the pixels.
+fn short_both_ways() -> FocusRequest {
+    FocusRequest { directions: None, ..short() }
+}
+
+async fn focus(socket: &Path, request: &FocusRequest) -> Result<Report> {
+    let report = Client::connect(socket).await?.focus_and_wait(request).await?;
+    assert_eq!(report.result.state, State::Focused, "{}", report.result.message);
+    Ok(report)
 }
 
 fn block_on<T>(future: impl Future<Output = Result<T>>) -> Result<T> {
@@ -145,6 +158,95 @@ fn numbers_of_runs_go_on_after_a_restart() -> Result<()> {
     assert_eq!(kept, first);
     assert_eq!(second.run_id, first.run_id + 1);
     Ok(())
+}
+
+#[test]
+fn the_delay_that_runs_have_taught_is_kept_over_a_restart() -> Result<()> {
+    let daemon = Daemon::start()?;
+    let learnt = |report: &Report| report.rig_delay.map(|delay| delay.measurements);
+    let one_way = block_on(focus(&daemon.socket(), &short()))?;
+    assert_eq!(learnt(&one_way), Some(0));
+    assert!(!daemon.path("state/rig-delay.json").exists(), "one way teaches nothing");
+    let both_ways = block_on(focus(&daemon.socket(), &short_both_ways()))?;
+    assert_eq!(learnt(&both_ways), Some(1));
+    let (_, _, folder) = daemon.end("-TERM")?;
+    let daemon = Daemon::start_in(folder)?;
+    let one_way = block_on(focus(&daemon.socket(), &short()))?;
+    assert_eq!(learnt(&one_way), Some(1));
+    Ok(())
+}
+
+#[test]
+fn a_damaged_delay_is_warned_of_and_learnt_anew() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    fs::create_dir_all(folder.path().join("state"))?;
+    fs::write(folder.path().join("state/rig-delay.json"), "{\"format\": 1, \"base_")?;
+    let daemon = Daemon::start_in(folder)?;
+    assert!(daemon.started.contains("rig-delay.json"), "{}", daemon.started);
+    assert!(daemon.started.contains("learnt anew"), "{}", daemon.started);
+    let report = block_on(focus(&daemon.socket(), &short_both_ways()))?;
+    assert_eq!(report.rig_delay.map(|delay| delay.measurements), Some(1));
+    let (_, _, folder) = daemon.end("-TERM")?;
+    let file = fs::read_to_string(folder.path().join("state/rig-delay.json"))?;
+    assert!(file.contains("\"measurements\": 1") && file.contains("simulated"), "{file}");
+    Ok(())
+}
+
+#[test]
+fn a_full_disk_costs_the_learnt_delay_no_more_than_a_warning() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    fs::create_dir_all(folder.path().join("state"))?;
+    symlink("/dev/full", folder.path().join("state/rig-delay.json.new"))?;
+    let daemon = Daemon::start_in(folder)?;
+    block_on(async {
+        focus(&daemon.socket(), &short_both_ways()).await?;
+        let mut client = Client::connect(&daemon.socket()).await?;
+        let fault = client.status().await?.fault.context("a fault")?;
+        assert!(fault.contains("rig-delay.json") && fault.contains("make room"), "{fault}");
+        // It teaches nothing; what the one before has taught finds room now.
+        let second = focus(&daemon.socket(), &short()).await?;
+        assert_eq!(second.rig_delay.map(|delay| delay.measurements), Some(1), "from memory");
+        assert_eq!(client.status().await?.fault, None);
+        Ok(())
+    })?;
+    assert!(daemon.path("state/rig-delay.json").exists());
+    Ok(())
+}
+
+#[test]
+fn a_window_is_named_in_parts_of_the_picture_and_reported_in_pixels() -> Result<()> {
+    let daemon = Daemon::start()?;
+    let part = |x: f64| FocusWindow { x, y: 0.0, width: 0.5, height: 1.0, unit: Some(WindowUnit::Fraction) };
+    block_on(async {
+        let request = |windows, prefer: &str| FocusRequest {
+            windows,
+            prefer: Some(prefer.to_owned()),
+            speed: Some("fast".to_owned()),
+            ..short()
+        };
+        let client = Client::connect(&daemon.socket()).await?;
+        let refused = client.focus_and_wait(&request(vec![part(0.0), part(0.6)], "strongest")).await;
+        let error = refused.err().context("a refusal")?.to_string();
+        assert!(error.contains("window 1") && error.contains("0.6"), "{error}");
+        let client = Client::connect(&daemon.socket()).await?;
+        let refused = client.focus_and_wait(&request(vec![part(0.0)], "1")).await;
+        let error = refused.err().context("a refusal")?.to_string();
+        assert!(error.contains("window 1") && error.contains("1 windows"), "{error}");
+        let report = focus(&daemon.socket(), &request(vec![part(0.0), part(0.5)], "1")).await?;
+        assert_eq!(report.request.speed.as_deref(), Some("fast"));
+        let second = report.request.windows.get(1).context("a second window")?;
+        assert_eq!((second.x, second.width, second.unit), (173.0, 173.0, Some(WindowUnit::Pixels)));
+        assert_eq!((report.result.window, report.result.decided_by.as_deref()), (Some(1), Some("structure")));
+        let position = report.result.position.context("a position")?;
+        let error_bar = report.result.error_bar.context("an error bar")?;
+        assert!((position - 1985.0).abs() < 4.0 * error_bar, "{position} of {error_bar}");
+        let last = Client::connect(&daemon.socket()).await?.status().await?.last_run.context("a run")?;
+        assert_eq!((last.error_bar, last.confidence), (Some(error_bar), report.result.confidence));
+        let sweep = report.sweeps.first().context("a sweep")?;
+        assert_eq!((sweep.windows.len(), sweep.structure.is_some()), (2, true));
+        assert_eq!(sweep.map.as_ref().map(|map| map.significance.len()), Some(24));
+        Ok(())
+    })
 }
 
 #[test]

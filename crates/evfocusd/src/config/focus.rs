@@ -1,11 +1,11 @@
 //! `[focus]`: how a run goes.
 
-use evfocus_core::controller::{ControllerConfig, OnFailure};
-use evfocus_core::{Directions, LensPosition, LensRange, LensSpeed, Method, SweepCapacity, SweepLimits};
+use evfocus_core::controller::{ControllerConfig, OnFailure, Pace};
+use evfocus_core::{LensPosition, LensRange, LensSpeed, Method, Prefer, SweepCapacity, SweepLimits};
 use evfocus_hal::LensInfo;
 use serde::Deserialize;
 
-use super::BadValue;
+use super::value::{BadValue, set, set_choice, set_duration};
 
 /// Most memory that counts and events of a sweep may take.
 const MOST_BYTES: f64 = 4e9;
@@ -15,12 +15,20 @@ const MOST_BYTES: f64 = 4e9;
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FocusSection {
-    /// `egs` (default), `egs-official`, `er-fixed`, `er-squared` or `structure`.
+    /// `auto` (default), `structure`, `mirror-pairs`, `egs`, `egs-official`, `er-fixed` or `er-squared`.
     pub method: Option<String>,
     /// Accumulation interval of `er-fixed`, milliseconds; 1 to 10,000, default 55.
     pub interval_ms: Option<f64>,
-    /// `both` (default): there and back, the mean is the answer; `forward`: one sweep.
-    pub directions: Option<String>,
+    /// `fast`: one sweep that ends beyond the peak; `normal` (default): and back over the peak; `accurate`: the whole range, both ways.
+    pub speed: Option<String>,
+    /// Which of several windows or depths counts: `strongest` (default) or `nearest`.
+    pub prefer: Option<String>,
+    /// The end of the range at which near subjects are sharp: `max` (default) or `min`.
+    pub nearest_at: Option<String>,
+    /// An answer this near to the truth is as good as the truth, counts; default 0; 1 % of the range swept if that is more.
+    pub depth_of_focus_counts: Option<f64>,
+    /// By what share of its length the range is extended where focus seems to lie beyond its end; 0 (never) to 1, default 0.25.
+    pub extend_range: Option<f64>,
     /// Speed of the sweep, counts per second; default: the lens's highest.
     pub sweep_speed_counts_per_s: Option<f64>,
     /// Rest before the sweep and before the verdict, milliseconds; 10 to 10,000, default 100.
@@ -89,33 +97,22 @@ impl FocusSection {
                 .parse::<Method>()
                 .map_err(|error| BadValue::new("focus.method", name, error.to_string()))?;
         }
-        if let Some(name) = &self.directions {
-            config.directions = match name.as_str() {
-                "both" => Directions::Both,
-                "forward" => Directions::Forward,
-                _ => {
-                    return Err(BadValue::new(
-                        "focus.directions",
-                        name,
-                        "it must be \"both\" or \"forward\"",
-                    ));
-                }
-            };
-        }
-        if let Some(name) = &self.on_failure {
-            config.on_failure = match name.as_str() {
-                "restore" => OnFailure::Restore,
-                "stay" => OnFailure::Stay,
-                _ => {
-                    return Err(BadValue::new(
-                        "focus.on_failure",
-                        name,
-                        "it must be \"restore\" or \"stay\"",
-                    ));
-                }
-            };
-        }
-        Ok(())
+        let paces = Pace::ALL.map(|pace| (pace.name(), pace));
+        set_choice(&mut config.pace, "focus.speed", self.speed.as_ref(), &paces)?;
+        let preferences = [("strongest", Prefer::Strongest), ("nearest", Prefer::Nearest)];
+        set_choice(&mut config.prefer, "focus.prefer", self.prefer.as_ref(), &preferences)?;
+        let ends = [("max", true), ("min", false)];
+        set_choice(&mut config.nearest_is_high, "focus.nearest_at", self.nearest_at.as_ref(), &ends)?;
+        let what_then = [("restore", OnFailure::Restore), ("stay", OnFailure::Stay)];
+        set_choice(&mut config.on_failure, "focus.on_failure", self.on_failure.as_ref(), &what_then)?;
+        set(
+            &mut config.depth_of_focus,
+            "focus.depth_of_focus_counts",
+            self.depth_of_focus_counts,
+            0.0,
+            config.limits.length(),
+        )?;
+        set(&mut config.extension, "focus.extend_range", self.extend_range, 0.0, 1.0)
     }
 
     fn motion(&self, config: &mut ControllerConfig, lens: &LensInfo) -> Result<(), BadValue> {
@@ -213,24 +210,4 @@ impl FocusSection {
         )?;
         set(&mut config.edge_share, "focus.edge_share", self.edge_share, 0.0, 0.4)
     }
-}
-
-fn set(place: &mut f64, key: &str, value: Option<f64>, min: f64, max: f64) -> Result<(), BadValue> {
-    if let Some(value) = value {
-        *place = BadValue::check(key, value, min, max)?;
-    }
-    Ok(())
-}
-
-fn set_duration(
-    place: &mut std::time::Duration,
-    key: &str,
-    value: Option<f64>,
-    unit_s: f64,
-    (min, max): (f64, f64),
-) -> Result<(), BadValue> {
-    if let Some(value) = value {
-        *place = BadValue::duration(key, value, unit_s, min, max)?;
-    }
-    Ok(())
 }

@@ -3,9 +3,12 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, Input, Snapshot};
-use evfocus_core::{Controller, CurvePoint, EventBatch, HostMicros, LensSample, RunId, RunReport};
+use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, Input, Pace, Snapshot};
+use evfocus_core::{
+    Controller, CurvePoint, DelayModel, EventBatch, Geometry, HostMicros, LensSample, RunId, RunReport,
+};
 use evfocus_hal::Clock;
+use evfocus_ipc as ipc;
 use rtrb::{Consumer, Producer};
 use tokio::sync::{mpsc, watch};
 
@@ -33,13 +36,28 @@ pub(crate) struct Publications {
     /// The live curve.
     pub(crate) curve: Producer<(RunId, CurvePoint)>,
     /// The record of each run.
-    pub(crate) reports: mpsc::Sender<Box<RunReport>>,
+    pub(crate) reports: mpsc::Sender<Box<EndedRun>>,
+}
+
+/// A run that ended, with what its record does not hold.
+#[derive(Debug)]
+pub(crate) struct EndedRun {
+    /// Its record.
+    pub(crate) report: RunReport,
+    /// How late the pixels are, as far as this run and those before have taught.
+    pub(crate) delays: DelayModel,
+    /// How thorough it was to be.
+    pub(crate) pace: Pace,
 }
 
 /// The thread's ends of its queues.
 pub(crate) struct ControlThread {
     /// The state machine.
     pub(crate) controller: Controller,
+    /// Of the camera.
+    pub(crate) geometry: Geometry,
+    /// How thorough the run under way, or the last one, is.
+    pub(crate) pace: Pace,
     /// Host time.
     pub(crate) clock: Arc<dyn Clock>,
     /// Filled batches come here.
@@ -124,14 +142,7 @@ impl ControlThread {
             let now = self.clock.now();
             match command {
                 Command::Focus { request, answer } => {
-                    let done = wire::focus_request(&request).and_then(|request| {
-                        match self.controller.command(CoreCommand::Focus(request), now, actions) {
-                            Ok(Accepted::Started(run) | Accepted::UnderWay(run)) => Ok(run.0),
-                            Ok(Accepted::Done) => Ok(0),
-                            Err(refusal) => Err(wire::refusal(&refusal)),
-                        }
-                    });
-                    reply(answer, done);
+                    reply(answer, self.focus(&request, now, actions));
                 }
                 Command::Abort { answer } => {
                     let run = self.controller.snapshot().run;
@@ -156,6 +167,24 @@ impl ControlThread {
         }
     }
 
+    fn focus(
+        &mut self,
+        request: &ipc::FocusRequest,
+        now: HostMicros,
+        actions: &mut Vec<Action>,
+    ) -> Result<u64, ipc::Error> {
+        let request = wire::focus_request(request, self.geometry)?;
+        match self.controller.command(CoreCommand::Focus(request), now, actions) {
+            Ok(Accepted::Started(run)) => {
+                self.pace = request.pace.unwrap_or(self.controller.config().pace);
+                Ok(run.0)
+            }
+            Ok(Accepted::UnderWay(run)) => Ok(run.0),
+            Ok(Accepted::Done) => Ok(0),
+            Err(refusal) => Err(wire::refusal(&refusal)),
+        }
+    }
+
     fn perform(&mut self, actions: &mut Vec<Action>) {
         for action in actions.drain(..) {
             if action == Action::RunEnded {
@@ -167,10 +196,11 @@ impl ControlThread {
     }
 
     fn hand_over_report(&mut self) {
-        if let Some(report) = self.controller.report()
-            && self.publications.reports.try_send(Box::new(report.clone())).is_err()
-        {
-            tracing::error!(run = report.id.0, "the report was not taken and is lost");
+        let Some(report) = self.controller.report().cloned() else { return };
+        let run = report.id.0;
+        let ended = EndedRun { report, delays: self.controller.delays(), pace: self.pace };
+        if self.publications.reports.try_send(Box::new(ended)).is_err() {
+            tracing::error!(run, "the report was not taken and is lost");
         }
     }
 
@@ -202,7 +232,7 @@ impl ControlThread {
 }
 
 /// Answers a client, who may have gone.
-fn reply<Value>(answer: crate::handle::Answer<Value>, value: Result<Value, evfocus_ipc::Error>) {
+fn reply<Value>(answer: crate::handle::Answer<Value>, value: Result<Value, ipc::Error>) {
     if answer.send(value).is_err() {
         tracing::debug!("a client went before its answer");
     }

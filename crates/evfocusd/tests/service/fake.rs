@@ -192,6 +192,9 @@ impl Fake {
                 state,
                 position: report.result.position,
                 reason: reason.map(str::to_owned),
+                error_bar: None,
+                confidence: None,
+                flags: Vec::new(),
             });
         });
         drop(self.progress.send(Arc::new(Progress { done: true, report: Some(report), ..news(id, None) })));
@@ -273,9 +276,16 @@ fn report(run_id: u64, request: FocusRequest, state: State, reason: Option<&str>
             lens_position: Some(1892.0),
             position_before: 220.0,
             method: None,
+            decided_by: None,
+            error_bar: None,
+            confidence: None,
+            flags: Vec::new(),
+            second_depth: None,
+            window: None,
         },
         sweeps: Vec::new(),
         delay_us: None,
+        rig_delay: None,
         hot_pixels: 0,
         clock_map: None,
         events: evfocus_ipc::EventCounts::default(),
