@@ -5,9 +5,11 @@ mod duration;
 mod position;
 mod rig;
 mod socket;
+mod window;
 
 pub use choice::choices;
 pub use duration::duration;
 pub use position::{position, speed};
 pub use rig::RigArguments;
 pub use socket::SocketArguments;
+pub use window::window;

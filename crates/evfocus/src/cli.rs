@@ -3,7 +3,8 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
-    abort, analyze, completions, demo, devices, focus, info, mode, move_lens, report, simulate, status, watch,
+    abort, analyze, completions, demo, devices, eval, focus, info, measure, mode, move_lens, report,
+    simulate, status, watch,
 };
 use crate::exit::Exit;
 
@@ -41,6 +42,8 @@ enum Command {
     Info(info::Arguments),
     Simulate(simulate::Arguments),
     Demo(demo::Arguments),
+    Eval(eval::Arguments),
+    Measure(measure::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -60,6 +63,8 @@ impl Cli {
             Command::Info(arguments) => info::run(&arguments),
             Command::Simulate(arguments) => simulate::run(&arguments),
             Command::Demo(arguments) => demo::run(&arguments),
+            Command::Eval(arguments) => eval::run(&arguments),
+            Command::Measure(arguments) => measure::run(&arguments),
             Command::Completions(arguments) => completions::run(&arguments, &mut Self::command()),
         }
     }

@@ -3,11 +3,14 @@
 //! Not its job: choosing what is shown; callers add sweeps, answers and the truth.
 
 mod draw;
+mod map;
 
 use std::path::Path;
 
 use evfocus_core::{LegReport, LensPosition, Method};
 use evfocus_ipc::{Direction, Report};
+
+pub(crate) use map::FocusMap;
 
 /// A picture to be drawn.
 #[derive(Debug, Clone)]

@@ -41,6 +41,14 @@ pub(crate) fn half_difference(delay_us: f64, speed: Option<f64>) -> String {
     }
 }
 
+/// A position in counts with its standard deviation, and how probable it is to be right, as far as they are known.
+pub(crate) fn answer(position: f64, error_bar: Option<f64>, confidence: Option<f64>) -> String {
+    let error_bar = error_bar.map(|error_bar| format!(" ± {error_bar:.1}")).unwrap_or_default();
+    // Rounded down: nothing is quite sure.
+    let confidence = confidence.map(|share| format!(", {:.0} % sure", (share * 100.0).floor()));
+    format!("{position:.1}{error_bar} counts{}", confidence.unwrap_or_default())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -50,6 +58,12 @@ mod tests {
         for (number, text) in [(0, "0"), (999, "999"), (1000, "1,000"), (1_234_567, "1,234,567")] {
             assert_eq!(count(number), text);
         }
+    }
+
+    #[test]
+    fn an_answer_says_how_sure_it_is() {
+        assert_eq!(answer(1892.52, Some(4.26), Some(0.9996)), "1892.5 ± 4.3 counts, 99 % sure");
+        assert_eq!(answer(1892.52, None, None), "1892.5 counts");
     }
 
     #[test]

@@ -11,10 +11,15 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
-use evfocus_core::{CameraMicros, Failure, LegReport, LensPosition, LensSpeed, LensTrace, Method};
-use evfocus_ipc::Direction;
+use evfocus_core::{
+    CameraMicros, Failure, Flags, Geometry, LegReport, LensPosition, LensSpeed, LensTrace, Method, Prefer,
+    Windows,
+};
+use evfocus_ipc::{Direction, FocusWindow};
 use evfocus_record::{Format, Summary, positions};
+use evfocusd::windows;
 
+use crate::exit::UsageError;
 use crate::files::must_not_be_folder;
 pub(crate) use verdict::Verdict;
 
@@ -26,6 +31,8 @@ pub(crate) struct Request {
     pub(crate) format: Option<Format>,
     pub(crate) method: Method,
     pub(crate) interval: Duration,
+    pub(crate) windows: Vec<FocusWindow>,
+    pub(crate) prefer: Prefer,
 }
 
 /// What one way of the lens says.
@@ -63,6 +70,13 @@ pub(crate) struct RecordingAnalysis {
     pub(crate) warnings: Vec<String>,
 }
 
+impl RecordingAnalysis {
+    /// What is odd about the answer.
+    pub(crate) fn flags(&self) -> Flags {
+        self.verdict.outcome.as_ref().map(|answer| answer.flags).unwrap_or_default()
+    }
+}
+
 /// Analyzes a recording: one pass to learn its size, one to count its events.
 pub(crate) fn analyze(request: &Request) -> anyhow::Result<RecordingAnalysis> {
     must_not_be_folder(&request.recording, "recording")?;
@@ -79,12 +93,24 @@ pub(crate) fn analyze(request: &Request) -> anyhow::Result<RecordingAnalysis> {
         warnings.extend(coverage::check_recording(&legs.sweeps, &summary, recorded, &request.recording)?);
         legs.stretch_to(recorded);
         legs.check_lengths(&request.positions)?;
-        read::analyze_sweeps(request, geometry, summary.events, &legs.sweeps)?
+        let windows = windows_on(geometry, request)?;
+        read::analyze_sweeps(request, geometry, &windows, summary.events, &legs.sweeps)?
     } else {
         Vec::new()
     };
-    let verdict = Verdict::of(&sweeps, request.method);
+    let verdict = Verdict::of(&sweeps, request.method, request.prefer);
     Ok(RecordingAnalysis { format: summary.format, method: request.method, sweeps, verdict, warnings })
+}
+
+/// The windows asked for, in pixels of the recording's sensor.
+fn windows_on(geometry: Geometry, request: &Request) -> Result<Windows, UsageError> {
+    windows::in_pixels(&request.windows, geometry).map_err(|error| UsageError(in_options(&error)))
+}
+
+/// The daemon's words for what is wrong, with the name of the option.
+fn in_options(error: &evfocus_ipc::Error) -> String {
+    let evfocus_ipc::Error::InvalidArgument { value, remedy, .. } = error else { return error.to_string() };
+    format!("--window is {value}: {remedy}")
 }
 
 /// The name of a file for messages.

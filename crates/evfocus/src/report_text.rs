@@ -2,21 +2,41 @@
 
 use std::io::Write;
 
-use evfocus_ipc::{Report, State};
+use evfocus_ipc::{Report, RigDelay, State, Sweep};
 
 use crate::output::Output;
-use crate::quantity::{count, half_difference, rate};
+use crate::quantity::{answer, count, half_difference, rate};
 
-/// The outcome in one line, and what was odd.
+/// What is odd about an answer, in as few words as there are.
+pub(crate) fn flags(names: &[String]) -> String {
+    names.join(", ").replace('-', " ")
+}
+
+/// The outcome in one line, what else is known of the answer, and what was odd.
 pub(crate) fn print_outcome(report: &Report, out: &mut Output) -> anyhow::Result<()> {
     let result = &report.result;
     match (result.state, result.position) {
         (State::Focused, Some(position)) => {
-            let method = result.method.as_deref().unwrap_or("no method");
-            writeln!(out, "focused at {position:.1} counts ({method}) in {:.1} s", report.elapsed_s)?;
+            let method = result.decided_by.as_ref().or(result.method.as_ref());
+            writeln!(
+                out,
+                "focused at {} ({}) in {:.1} s",
+                answer(position, result.error_bar, result.confidence),
+                method.map_or("no method", String::as_str),
+                report.elapsed_s
+            )?;
         }
         (State::Idle, _) => writeln!(out, "{}", result.message)?,
         _ => writeln!(out, "failed: {}: {}", result.reason.as_deref().unwrap_or("unknown"), result.message)?,
+    }
+    if let Some(number) = result.window {
+        let place = report.request.windows.get(number as usize).map(|window| {
+            format!(", {} x {} pixels at {}, {}", window.width, window.height, window.x, window.y)
+        });
+        writeln!(out, "window {number} decided{}", place.unwrap_or_default())?;
+    }
+    if let Some(second) = result.second_depth {
+        writeln!(out, "second depth at {second:.1} counts")?;
     }
     for warning in &report.warnings {
         writeln!(out, "note: {warning}")?;
@@ -38,6 +58,18 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
     if let Some(delay_us) = report.delay_us {
         writeln!(out, "{}", half_difference(delay_us, report.request.speed_counts_per_s))?;
     }
+    if let Some(RigDelay { base_us, us_per_hz, measurements }) = report.rig_delay {
+        let (base, slope) = (base_us * 1e-3, us_per_hz * 1e-3);
+        let learnt = match measurements {
+            0 => String::from("assumed"),
+            1 => String::from("learnt from 1 run"),
+            more => format!("learnt from {more} runs"),
+        };
+        writeln!(
+            out,
+            "delay of the pixels  {base:.1} ms and {slope:.1} ms for each Hz of their noise, {learnt}"
+        )?;
+    }
     let events = &report.events;
     writeln!(
         out,
@@ -50,15 +82,7 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
         rate(report.sweeps.iter().flat_map(|sweep| &sweep.curve.rate).copied().fold(0.0, f64::max))
     )?;
     for sweep in &report.sweeps {
-        writeln!(out, "sweep from {:.1} to {:.1} counts", sweep.from, sweep.to)?;
-        for said in &sweep.estimators {
-            let answer = match (said.position, &said.reason) {
-                (Some(position), _) => format!("{position:>8.1} counts in {} steps", said.iterations),
-                (None, Some(reason)) => format!("no answer: {reason}"),
-                (None, None) => String::from("no answer"),
-            };
-            writeln!(out, "  {:<12} {answer}", said.method)?;
-        }
+        print_sweep(sweep, out)?;
     }
     if let Some(map) = report.clock_map {
         writeln!(out, "clocks: drift {:.1} ppm, residual {:.0} us", map.drift_ppm, map.residual_us)?;
@@ -66,5 +90,32 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
     let timings: Vec<String> =
         report.timings.iter().map(|timing| format!("{} {:.2} s", timing.phase, timing.seconds)).collect();
     writeln!(out, "time: {}", timings.join(", "))?;
+    Ok(())
+}
+
+fn print_sweep(sweep: &Sweep, out: &mut Output) -> anyhow::Result<()> {
+    writeln!(out, "sweep from {:.1} to {:.1} counts", sweep.from, sweep.to)?;
+    for said in &sweep.estimators {
+        let answer = match (said.position, &said.reason) {
+            (Some(position), _) => format!("{position:>8.1} counts in {} steps", said.iterations),
+            (None, Some(reason)) => format!("no answer: {reason}"),
+            (None, None) => String::from("no answer"),
+        };
+        writeln!(out, "  {:<12} {answer}", said.method)?;
+    }
+    if let Some(said) = sweep.structure {
+        writeln!(
+            out,
+            "  peak         {:.0} counts wide, {:.0} times what chance makes; pixel noise {:.2} Hz",
+            said.width, said.significance, said.noise_hz
+        )?;
+    }
+    for (number, window) in sweep.windows.iter().enumerate() {
+        let answer = match (window.position, &window.reason) {
+            (Some(position), _) => answer(position, window.error_bar, None),
+            (None, reason) => format!("no answer: {}", reason.as_deref().unwrap_or("unknown")),
+        };
+        writeln!(out, "  window {number:<5} {answer}")?;
+    }
     Ok(())
 }

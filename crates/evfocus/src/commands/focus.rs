@@ -4,11 +4,13 @@ use std::time::Duration;
 
 use anyhow::bail;
 use clap::Args;
-use evfocus_core::LensSpeed;
+use clap::builder::PossibleValuesParser;
+use evfocus_core::controller::Pace;
+use evfocus_core::{LensSpeed, Prefer};
 use evfocus_ipc::client::{ClientError, Following};
-use evfocus_ipc::{Error, FocusRequest, LensRange, Phase, Progress, Report, State};
+use evfocus_ipc::{Error, FocusRequest, FocusWindow, LensRange, Phase, Progress, Report, State};
 
-use crate::arguments::{SocketArguments, duration, position, speed};
+use crate::arguments::{SocketArguments, duration, position, speed, window};
 use crate::connection::{block_on, connect};
 use crate::curve_view::{CurveFrame, CurveView};
 use crate::exit::{Exit, UsageError};
@@ -20,21 +22,39 @@ use crate::report_text;
 #[command(after_help = "\
 Examples:
   evfocus focus
-  evfocus focus --from 1500 --to 2500 --speed 800
+  evfocus focus --speed fast
+  evfocus focus --window 0.4,0.4,0.2,0.2
+  evfocus focus --window 100,80,60,40 --window 200,80,60,40 --prefer nearest
+  evfocus focus --from 1500 --to 2500 --sweep-speed 800
   evfocus focus --method er-fixed --interval 65ms --json | jq .result.position
 
 What is left out is taken from the daemon's configuration. If the same run is already under way, the command follows it.
 
-Units: positions in lens counts, speeds in counts per second, intervals with their unit (55ms, 0.055s).
+Units: positions in lens counts, sweep speeds in counts per second, intervals with their unit (55ms, 0.055s), windows in pixels \
+from the upper left corner, or in parts of the picture if written with a decimal point or a % (0.4,0.4,0.2,0.2 or 40%,40%,20%,20%).
+
+The result is told with one standard deviation (±) and the probability that it is right to within the depth of focus, or 1 % of \
+the range if that is more.
 
 On a terminal the focus curve is drawn while the lens sweeps. Ctrl-C aborts the run: the lens stops where it is. A second \
 Ctrl-C leaves at once. If the command is killed or loses its connection, the run goes on; evfocus abort stops it.
 
 Exit status: 0 focused, 1 an error, 2 wrong usage, 3 the run ended without focus.")]
 pub struct Arguments {
-    /// Focus measure and search: egs, egs-official, er-fixed, er-squared, structure
+    /// Focus measure and search: auto, structure, mirror-pairs, egs, egs-official, er-fixed, er-squared
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
+    /// How thorough: fast (one sweep, which ends beyond the peak), normal (the same, and back over the peak) or accurate (the whole
+    /// range, both ways)
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Pace::ALL.map(Pace::name)))]
+    speed: Option<String>,
+    /// A window of the picture to focus on, instead of the whole; up to eight times. Whole numbers are pixels, with a decimal point
+    /// or a % they are parts of the picture
+    #[arg(long = "window", value_name = "X,Y,W,H", value_parser = window, allow_hyphen_values = true)]
+    windows: Vec<FocusWindow>,
+    /// Which of several windows or depths counts: strongest, nearest, or the number of a window, counted from 0
+    #[arg(long, value_name = "WHICH", allow_negative_numbers = true)]
+    prefer: Option<Prefer>,
     /// Low end of the sweep, in lens counts
     #[arg(long, value_name = "POSITION", value_parser = position, requires = "to", allow_negative_numbers = true)]
     from: Option<f64>,
@@ -43,11 +63,11 @@ pub struct Arguments {
     to: Option<f64>,
     /// Speed of the sweep, in counts per second
     #[arg(long, value_name = "SPEED", value_parser = speed, allow_negative_numbers = true)]
-    speed: Option<LensSpeed>,
+    sweep_speed: Option<LensSpeed>,
     /// Accumulation interval of er-fixed, with its unit: 55ms, 0.055s
     #[arg(long, value_name = "DURATION", value_parser = duration)]
     interval: Option<Duration>,
-    /// Sweep one way only: faster, but lag and backlash are not cancelled
+    /// Sweep one way only, whatever the speed: lag and backlash are not cancelled
     #[arg(long)]
     one_way: bool,
     #[command(flatten)]
@@ -59,9 +79,12 @@ impl Arguments {
         FocusRequest {
             method: self.method.clone(),
             range: self.from.zip(self.to).map(|(min, max)| LensRange { min, max }),
-            speed_counts_per_s: self.speed.map(LensSpeed::counts_per_second),
+            speed: self.speed.clone(),
+            speed_counts_per_s: self.sweep_speed.map(LensSpeed::counts_per_second),
             interval_us: self.interval.map(|interval| interval.as_micros() as u64),
             directions: self.one_way.then(|| String::from("forward")),
+            windows: self.windows.clone(),
+            prefer: self.prefer.map(|prefer| prefer.to_string()),
         }
     }
 }
@@ -111,7 +134,11 @@ fn in_own_words(error: ClientError) -> anyhow::Error {
 fn option(parameter: &str) -> Option<&'static str> {
     match parameter {
         "interval_us" => Some("--interval"),
-        "speed_counts_per_s" => Some("--speed"),
+        "method" => Some("--method"),
+        "speed" => Some("--speed"),
+        "speed_counts_per_s" => Some("--sweep-speed"),
+        "windows" => Some("--window"),
+        "prefer" => Some("--prefer"),
         "range" => Some("--from and --to"),
         "range start" => Some("--from"),
         "range end" => Some("--to"),

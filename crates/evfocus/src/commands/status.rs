@@ -9,7 +9,8 @@ use crate::arguments::SocketArguments;
 use crate::connection::{block_on, connect};
 use crate::exit::Exit;
 use crate::output::Output;
-use crate::quantity::{count, rate};
+use crate::quantity::{answer, count, rate};
+use crate::report_text::flags;
 
 /// Say what the daemon is doing: mode, state, lens, events, last run
 #[derive(Debug, Args)]
@@ -71,10 +72,12 @@ fn last_run(run: &LastRun) -> String {
     let how = match run.state {
         State::Idle => String::from("aborted"),
         State::Scanning => String::from("under way"),
-        State::Focused => {
-            run.position.map_or_else(|| String::from("focused"), |at| format!("focused at {at:.1} counts"))
-        }
+        State::Focused => run.position.map_or_else(
+            || String::from("focused"),
+            |at| format!("focused at {}", answer(at, run.error_bar, run.confidence)),
+        ),
         State::Failed => format!("failed: {}", run.reason.as_deref().unwrap_or("no reason given")),
     };
-    format!("{}: {how}", run.id)
+    let flags = if run.flags.is_empty() { String::new() } else { format!("; {}", flags(&run.flags)) };
+    format!("{}: {how}{flags}", run.id)
 }

@@ -189,6 +189,6 @@ fn rate_unit(plot: &FocusPlot) -> (f64, &'static str) {
 }
 
 /// Plotters' errors borrow what anyhow wants to own.
-fn failed(error: impl std::fmt::Display) -> anyhow::Error {
+pub(super) fn failed(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow!("{error}")
 }

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use evfocus_core::{
-    Analyzer, Event, EventBatch, Geometry, HotPixels, LegReport, SweepCapacity, SweepLimits, SweepRecorder,
+    Analyzer, Event, EventBatch, Geometry, HotPixels, LegReport, Question, SweepCapacity, SweepLimits,
+    SweepRecorder, Windows,
 };
 use evfocus_record::{MAX_EVENTS_PER_READ, Recording};
 
@@ -19,6 +20,7 @@ const SPARE: Duration = Duration::from_millis(100);
 pub(super) fn analyze_sweeps(
     request: &Request,
     geometry: Geometry,
+    windows: &Windows,
     events: u64,
     legs: &[SweepLeg],
 ) -> anyhow::Result<Vec<SweepAnalysis>> {
@@ -35,6 +37,7 @@ pub(super) fn analyze_sweeps(
         lost: 0,
         started: false,
     };
+    stage.analyzer.set_windows(windows.iter().flatten().copied());
     let mut waiting = legs.iter();
     let mut current = waiting.next();
     let mut sweeps = Vec::with_capacity(legs.len());
@@ -117,9 +120,12 @@ impl Stage {
         let verdict = self.analyzer.analyze(
             &self.recorder,
             &leg.trace,
-            request.method,
-            request.interval,
-            SweepLimits::default(),
+            Question {
+                method: request.method,
+                interval: request.interval,
+                limits: SweepLimits::default(),
+                ask_all: true,
+            },
             &mut report,
         );
         self.started = false;

@@ -321,7 +321,12 @@ fn without_a_daemon_the_commands_say_so() {
 fn wrong_usage_is_status_2() {
     refuses(&["fokus"], 2, &["fokus"]);
     refuses(&["move", "far"], 2, &["far", "counts"]);
-    refuses(&["focus", "--speed", "-3"], 2, &["speed"]);
+    refuses(&["focus", "--sweep-speed", "-3"], 2, &["sweep-speed"]);
+    refuses(&["focus", "--speed", "800"], 2, &["--speed", "fast, normal, accurate"]);
+    refuses(&["focus", "--window", "1,2,3"], 2, &["--window", "100,80,60,40"]);
+    refuses(&["focus", "--window", "-1,2,3,4"], 2, &["--window", "pixels"]);
+    refuses(&["focus", "--window", "0.5,0,0.5,1.5"], 2, &["--window", "0 to 1"]);
+    refuses(&["focus", "--prefer", "farthest"], 2, &["--prefer", "strongest", "nearest"]);
     refuses(&["focus", "--from", "300"], 2, &["--to"]);
     refuses(&["focus", "--from", "300", "--to", "200"], 2, &["300", "below", "200"]);
     let bare = evfocus::<&str>(&[]);

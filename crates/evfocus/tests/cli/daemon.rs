@@ -93,14 +93,22 @@ fn a_session_with_the_daemon() {
     daemon.refuses(&["report"], &["no report"]);
     daemon.refuses(&["move", "9999"], &["9999", "3750"]);
     daemon.refuses(&["focus", "--method", "guess"], &["guess", "egs"]);
-    let speed = daemon.run(&["focus", "--speed", "1"]);
+    let speed = daemon.run(&["focus", "--sweep-speed", "1"]);
     let message = stderr(&speed);
-    assert!(message.starts_with("error: --speed: ") && !message.contains("counts_per_s"), "{message}");
+    assert!(message.starts_with("error: --sweep-speed: ") && !message.contains("counts_per_s"), "{message}");
     assert_eq!(message.matches("a sweep of").count(), 1, "{message}");
-    daemon.refuses(&["focus", "--speed", "1e6"], &["error: --speed is 1000000; it must be from 0 to "]);
+    daemon.refuses(
+        &["focus", "--sweep-speed", "1e6"],
+        &["error: --sweep-speed is 1000000; it must be from 0 to "],
+    );
     let interval = daemon.run(&["focus", "--method", "er-fixed", "--interval", "9s"]);
     assert!(stderr(&interval).starts_with("error: --interval: an interval of 9 s"), "{}", stderr(&interval));
     daemon.refuses(&["focus", "--from", "1", "--to", "2"], &["error: --from", "220", "3750"]);
+    let off = ["focus", "--window", "0,0,10,10", "--window", "340,0,10,10"];
+    daemon.refuses(&off, &["error: --window: window 1: 10 x 10 pixels at 340, 0", "346 x 260"]);
+    daemon.refuses(&["focus", "--prefer", "1"], &["error: --prefer: window 1", "0 windows"]);
+    daemon
+        .refuses(&["focus", "--method", "egs", "--window", "0,0,9,9"], &["error: --method: ", "egs", "auto"]);
     assert_eq!(daemon.json(&["abort", "--json"])["run_id"], Value::Null);
 
     let moved = daemon.json(&["move", "400", "--wait", "--json"]);
@@ -130,6 +138,31 @@ fn a_run_is_followed_to_its_report() {
     assert_eq!(again, report);
     assert!(std::fs::read_to_string(plot).unwrap().contains("<svg"));
     assert!(stdout(&daemon.run(&["report"])).contains("sweep from 1500.0 to 2500.0"));
+}
+
+#[test]
+fn a_window_is_focused_on_and_the_answer_says_how_sure_it_is() {
+    let daemon = Daemon::start();
+    let focus = ["focus", "--from", "1500", "--to", "2500", "--speed", "fast", "--window", "25%,25%,50%,50%"];
+    let text = stdout(&daemon.run(&[&focus[..], &["--prefer", "0"]].concat()));
+    let report = daemon.json(&["report", "--json"]);
+    let (request, result) = (&report["request"], &report["result"]);
+    assert_eq!((&request["speed"], &request["directions"]), (&"fast".into(), &"forward".into()));
+    assert_eq!((&request["windows"][0]["x"], &request["prefer"]), (&87.0.into(), &"0".into()));
+    assert_eq!(report["sweeps"][0]["windows"][0]["width"], 173);
+    assert_eq!(report["sweeps"][0]["map"]["position"].as_array().map(Vec::len), Some(24));
+    // A machine that is too busy may make the run fail.
+    if result["state"] == "focused" {
+        for part in [" ± ", " % sure (structure)", "window 0 decided, 173 x 130 pixels at 87, 65"] {
+            assert!(text.contains(part), "no {part:?} in {text}");
+        }
+        assert!((number(result, "position") - 1985.0).abs() < 4.0 * number(result, "error_bar"), "{result}");
+        assert!(stdout(&daemon.run(&["status"])).contains(" % sure"));
+    }
+    let long = stdout(&daemon.run(&["report"]));
+    for part in ["delay of the pixels  6.0 ms", "assumed", "window 0", "peak   "] {
+        assert!(long.contains(part), "no {part:?} in {long}");
+    }
 }
 
 #[test]

@@ -11,4 +11,5 @@ mod analyze;
 mod bad_input;
 mod daemon;
 mod demo;
+mod eval;
 mod program;

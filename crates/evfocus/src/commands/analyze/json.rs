@@ -1,12 +1,13 @@
 //! What `analyze --json` prints.
 
-use evfocus_core::{Estimate, Failure, LegReport, Method, SearchError, SweepQuality};
-use evfocus_ipc::{Curve, Direction, State};
+use evfocus_core::{Answer, Estimate, Failure, Flags, LegReport, Method, SearchError, SweepQuality};
+use evfocus_ipc::{Curve, Direction, FocusMap, State, Structure, WindowAnswer};
+use evfocusd::sweep_report;
 use serde::Serialize;
 
 use crate::recording::{RecordingAnalysis, Request, SweepAnalysis};
 
-/// Positions in lens counts, times in microseconds of the camera's clock, rates in events per second.
+/// Positions, widths and error bars in lens counts, times in microseconds of the camera's clock, rates in events per second.
 #[derive(Debug, Serialize)]
 pub(super) struct Analysis {
     recording: String,
@@ -18,12 +19,24 @@ pub(super) struct Analysis {
     reason: Option<&'static str>,
     message: String,
     position: Option<f64>,
+    /// One standard deviation.
+    error_bar: Option<f64>,
+    /// The probability that the position is right to within 1 % of the range.
+    confidence: Option<f64>,
+    flags: Vec<&'static str>,
+    /// The estimator whose answer this is.
+    decided_by: Option<&'static str>,
+    second_depth: Option<f64>,
+    /// The number of the window that decided, from 0.
+    window: Option<u8>,
     /// When the first sweep passed the position.
     t_us: Option<f64>,
     /// Half the difference of the two directions as a time: lag plus backlash.
     delay_us: Option<f64>,
     events: u64,
     iterations: u64,
+    /// What each estimator said of the first sweep.
+    estimators: Vec<Estimator>,
     /// Of the first sweep.
     curve: Curve,
     sweeps: Vec<Sweep>,
@@ -51,6 +64,10 @@ struct Sweep {
     hot_pixels: usize,
     iterations: u64,
     estimators: Vec<Estimator>,
+    /// What the fine structure says; positions with the delay of the pixels still in them.
+    structure: Option<Structure>,
+    map: Option<FocusMap>,
+    windows: Vec<WindowAnswer>,
     quality: Quality,
     curve: Curve,
 }
@@ -83,6 +100,7 @@ struct Quality {
 impl Analysis {
     pub(super) fn of(analysis: &RecordingAnalysis, request: &Request) -> Self {
         let outcome = &analysis.verdict.outcome;
+        let found: Option<&Answer> = outcome.as_ref().ok();
         let sweeps: Vec<Sweep> =
             analysis.sweeps.iter().map(|sweep| Sweep::of(sweep, analysis.method)).collect();
         Self {
@@ -97,11 +115,18 @@ impl Analysis {
                 Ok(answer) => format!("focus is at {} counts", answer.position),
                 Err(failure) => failure.to_string(),
             },
-            position: outcome.as_ref().ok().map(|answer| answer.position.0),
-            t_us: outcome.as_ref().ok().map(|answer| answer.t_us),
+            position: found.map(|answer| answer.position.0),
+            error_bar: found.and_then(|answer| answer.error_bar),
+            confidence: found.and_then(|answer| answer.confidence),
+            flags: names(analysis.flags()),
+            decided_by: found.map(|answer| answer.decided_by.name()),
+            second_depth: found.and_then(|answer| Some(answer.second_depth?.0)),
+            window: found.and_then(|answer| answer.window),
+            t_us: analysis.verdict.t_us,
             delay_us: analysis.verdict.delay_us,
             events: sweeps.iter().map(|sweep| sweep.events).sum(),
             iterations: sweeps.iter().map(|sweep| sweep.iterations).sum(),
+            estimators: analysis.sweeps.first().map(|sweep| estimators(&sweep.report)).unwrap_or_default(),
             curve: sweeps.first().map(|sweep| sweep.curve.clone()).unwrap_or_default(),
             sweeps,
             warnings: analysis.warnings.clone(),
@@ -134,6 +159,9 @@ impl Sweep {
             hot_pixels: sweep.hot_pixels,
             iterations: said.map_or(0, |estimate| estimate.iterations.into()),
             estimators: estimators(report),
+            structure: sweep_report::structure(report),
+            map: sweep_report::map(report),
+            windows: sweep_report::windows(report),
             quality: Quality::of(&report.quality, report.peak_rate.0),
             curve: curve(report),
         }
@@ -156,6 +184,10 @@ impl Quality {
     }
 }
 
+fn names(flags: Flags) -> Vec<&'static str> {
+    flags.iter().map(evfocus_core::Flag::name).collect()
+}
+
 fn estimators(report: &LegReport) -> Vec<Estimator> {
     let asked = Method::ALL.into_iter().filter_map(|method| Some((method, report.estimate(method)?)));
     asked.map(|(method, said)| estimator(method, said)).collect()
@@ -166,7 +198,7 @@ fn estimator(method: Method, said: Result<Estimate, SearchError>) -> Estimator {
     Estimator {
         method: method.name(),
         state: state(estimate.is_some()),
-        reason: error.map(|error| Failure::NoAnswer(error).name()),
+        reason: error.map(|error| Failure::of_search(error).name()),
         message: error.map(|error| error.to_string()),
         position: estimate.map(|estimate| estimate.position.0),
         t_us: estimate.map(|estimate| estimate.t_us),

@@ -5,12 +5,24 @@ use std::io::Write;
 use evfocus_core::Method;
 
 use crate::output::Output;
-use crate::quantity::{count, half_difference, rate, seconds};
+use crate::quantity::{answer, count, half_difference, rate, seconds};
 use crate::recording::{RecordingAnalysis, SweepAnalysis};
 
 pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::Result<()> {
     match &analysis.verdict.outcome {
-        Ok(answer) => writeln!(out, "focused at {} counts ({})", answer.position, analysis.method)?,
+        Ok(found) => {
+            let said = answer(found.position.0, found.error_bar, found.confidence);
+            writeln!(out, "focused at {said} ({})", found.decided_by)?;
+            for flag in found.flags.iter() {
+                writeln!(out, "note: {}", flag.name().replace('-', " "))?;
+            }
+            if let Some(number) = found.window {
+                writeln!(out, "window {number} decided")?;
+            }
+            if let Some(second) = found.second_depth {
+                writeln!(out, "second depth at {second} counts")?;
+            }
+        }
         Err(failure) => writeln!(out, "failed: {}: {failure}", failure.name())?,
     }
     if let Some(delay_us) = analysis.verdict.delay_us {

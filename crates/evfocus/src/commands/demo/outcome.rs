@@ -2,13 +2,13 @@
 
 use std::io::Write;
 
-use evfocus_core::{LensPosition, Method, Outcome, Phase, RunReport};
+use evfocus_core::{Flag, LensPosition, Method, Outcome, Phase, RunReport};
 use hil_sim::RigConfig;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::output::Output;
-use crate::quantity::{count, half_difference};
+use crate::quantity::{answer, count, half_difference};
 
 /// Positions in lens counts, times in seconds of the rig's virtual time.
 #[derive(Debug, Serialize)]
@@ -20,9 +20,18 @@ pub(super) struct DemoOutcome {
     /// Where the scene is sharp; of two depths, the one nearer to the answer.
     truth: f64,
     error: Option<f64>,
+    /// One standard deviation, as far as the run knows.
+    error_bar: Option<f64>,
+    /// The probability that the position is right to within 1 % of the range, as far as the run knows.
+    confidence: Option<f64>,
+    /// What the run found odd.
+    flags: Vec<&'static str>,
+    /// Where a good part of the picture is sharp beside the position.
+    second_depth: Option<f64>,
     /// Where the lens came to rest.
     lens_position: f64,
     method: &'static str,
+    decided_by: Option<&'static str>,
     delay_us: Option<f64>,
     /// Of the sweeps, in counts per second.
     #[serde(skip)]
@@ -65,8 +74,13 @@ impl DemoOutcome {
             position: position.map(|position| position.0),
             truth: truth.0,
             error: position.map(|position| position.counts_from(truth)),
+            error_bar: report.answer.and_then(|answer| answer.error_bar),
+            confidence: report.answer.and_then(|answer| answer.confidence),
+            flags: report.answer.iter().flat_map(|answer| answer.flags.iter()).map(Flag::name).collect(),
+            second_depth: report.answer.and_then(|answer| answer.second_depth).map(|second| second.0),
             lens_position: report.position_after.0,
             method: report.plan.method.name(),
+            decided_by: report.answer.map(|answer| answer.decided_by.name()),
             delay_us: report.delay_us,
             speed: report.plan.speed.counts_per_second(),
             elapsed_s: report.elapsed().as_secs_f64(),
@@ -85,11 +99,18 @@ impl DemoOutcome {
 
     pub(super) fn print(&self, out: &mut Output) -> anyhow::Result<()> {
         if let (Some(position), Some(error)) = (self.position, self.error) {
-            writeln!(out, "focused at {position:.1} counts ({})", self.method)?;
+            let found = answer(position, self.error_bar, self.confidence);
+            writeln!(out, "focused at {found} ({})", self.decided_by.unwrap_or(self.method))?;
             writeln!(out, "truth      {:.1} counts, error {error:+.1}", self.truth)?;
         } else {
             writeln!(out, "failed: {}: {}", self.reason.unwrap_or("unknown"), self.message)?;
             writeln!(out, "truth      {:.1} counts", self.truth)?;
+        }
+        if let Some(second) = self.second_depth {
+            writeln!(out, "second     {second:.1} counts")?;
+        }
+        if !self.flags.is_empty() {
+            writeln!(out, "odd        {}", self.flags.join(", ").replace('-', " "))?;
         }
         writeln!(out, "lens       {:.1} counts", self.lens_position)?;
         if let Some(delay_us) = self.delay_us {
