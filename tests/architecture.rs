@@ -6,27 +6,43 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 /// Which crate of the project may depend on which. Development dependencies are free.
-const ARROWS: [(&str, &[&str]); 8] = [
+const ARROWS: [(&str, &[&str]); 9] = [
     ("evfocus-core", &[]),
     ("evfocus-ipc", &[]),
     ("evfocus-hal", &["evfocus-core"]),
     ("evfocus-record", &["evfocus-core"]),
     ("hil-sim", &["evfocus-core", "evfocus-hal"]),
+    ("evfocus-eval", &["evfocus-core", "evfocus-hal", "evfocus-record", "hil-sim"]),
     ("evfocusd", &["evfocus-core", "evfocus-hal", "evfocus-ipc", "hil-sim"]),
-    ("evfocus", &["evfocus-core", "evfocus-hal", "evfocus-ipc", "evfocus-record", "evfocusd", "hil-sim"]),
-    ("evfocus-tests", &["evfocus-core", "evfocus-hal", "evfocus-record", "evfocusd", "hil-sim"]),
+    (
+        "evfocus",
+        &[
+            "evfocus-core",
+            "evfocus-eval",
+            "evfocus-hal",
+            "evfocus-ipc",
+            "evfocus-record",
+            "evfocusd",
+            "hil-sim",
+        ],
+    ),
+    (
+        "evfocus-tests",
+        &["evfocus-core", "evfocus-eval", "evfocus-hal", "evfocus-record", "evfocusd", "hil-sim"],
+    ),
 ];
 
 /// Longest way from a crate to one without dependencies of the project.
 const LONGEST_CHAIN: usize = 4;
 
 /// Crates that only the named crates of the project may depend on.
-const FENCES: [(&str, &[&str]); 5] = [
+const FENCES: [(&str, &[&str]); 6] = [
     ("tokio", &["evfocus-ipc", "evfocusd", "evfocus"]),
-    ("serde", &["evfocus-ipc", "evfocusd", "evfocus"]),
+    ("serde", &["evfocus-eval", "evfocus-ipc", "evfocusd", "evfocus"]),
     ("clap", &["evfocusd", "evfocus"]),
-    ("plotters", &["evfocus"]),
-    ("rand", &["hil-sim"]),
+    ("plotters", &["evfocus-eval", "evfocus"]),
+    ("image", &["evfocus-eval"]),
+    ("rand", &["evfocus-eval", "hil-sim"]),
 ];
 
 fn root() -> PathBuf {

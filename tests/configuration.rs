@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use evfocus_core::Prefer;
+use evfocus_core::controller::Pace;
 use evfocusd::Config;
 
 fn folder() -> PathBuf {
@@ -60,7 +62,12 @@ fn mistakes_are_named_with_key_value_and_remedy() {
     refused("[focus]\nrest_ms = 5", &["focus.rest_ms", "5", "10"]);
     refused("[focus]\nrest_ms = nan", &["focus.rest_ms", "NaN"]);
     refused("[focus]\nsweep_speed_counts_per_s = 9000", &["sweep_speed_counts_per_s", "9000", "1765"]);
-    refused("[focus]\ndirections = \"backward\"", &["focus.directions", "backward", "both"]);
+    refused("[focus]\nspeed = \"quick\"", &["line 2", "focus.speed", "quick", "fast", "normal", "accurate"]);
+    refused("[focus]\nprefer = \"0\"", &["line 2", "focus.prefer", "0", "strongest", "nearest"]);
+    refused("[focus]\nnearest_at = \"top\"", &["line 2", "focus.nearest_at", "top", "max", "min"]);
+    refused("[focus]\ndepth_of_focus_counts = -1", &["line 2", "focus.depth_of_focus_counts", "-1", "3530"]);
+    refused("[focus]\nextend_range = 1.5", &["line 2", "focus.extend_range", "1.5"]);
+    refused("[focus]\ndirections = \"both\"", &["line 2", "directions"]);
     refused("[lens]\nbackend = \"moonlite\"", &["lens.backend", "moonlite", "simulated"]);
     refused("[lens]\nmin_counts = 3000\nmax_counts = 300", &["lens.min_counts", "3000", "300"]);
     refused("[lens]\nmax_counts = 9999", &["lens.max_counts", "9999", "3750"]);
@@ -93,6 +100,17 @@ fn mistakes_are_named_with_key_value_and_remedy() {
         &["simulation.faults.share", "lens-silent", "event-loss"],
     );
     refused("[daemon]\nsocket = \"\"", &["line 2", "daemon.socket"]);
+}
+
+#[test]
+fn the_keys_of_a_run_reach_the_controller() {
+    let text = "[focus]\nspeed = \"fast\"\nprefer = \"nearest\"\nnearest_at = \"min\"\ndepth_of_focus_counts = 50\nextend_range = 0";
+    let config = Config::parse(text, Path::new("rig.toml")).unwrap();
+    let rig = evfocusd::VirtualRig::new(&config).unwrap();
+    let controller = rig.controller().config();
+    assert_eq!((controller.pace, controller.prefer), (Pace::Fast, Prefer::Nearest));
+    assert!(!controller.nearest_is_high);
+    assert!((controller.depth_of_focus - 50.0).abs() + controller.extension < 1e-9);
 }
 
 #[test]

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use evfocus_core::controller::{Command, FocusRequest, FocusState, Mode, Refusal};
-use evfocus_core::{Directions, LensPosition, LensSpeed, Method, Outcome, Phase, RunReport};
+use evfocus_core::controller::{Command, FocusRequest, FocusState, Mode, Pace, Refusal};
+use evfocus_core::{
+    Directions, Flag, LensPosition, LensSpeed, Method, Outcome, Phase, Prefer, RunReport, Window, Windows,
+};
 use evfocusd::{Config, VirtualRig, VirtualRigError};
 use hil_sim::{Fault, FaultKind, FaultTrigger, Flicker};
 
@@ -48,8 +50,8 @@ fn a_still_scene_is_focused_and_the_lens_stands_there() -> Result<()> {
     let (rig, report) = run(&config("")?)?;
     let error = error_of(&rig, &report)?;
     println!("still scene: error {error:+.1}, delay {:?} us", report.delay_us);
-    // One hump each way; their mean lies between them. A blur of one pixel is 50 counts here.
-    assert!(error.abs() < 60.0, "{error}");
+    // A blur of one pixel is 50 counts here.
+    assert!(error.abs() < 10.0, "{error}");
     let tolerance = rig.controller().config().position_tolerance;
     let Outcome::Focused { position } = report.outcome else { anyhow::bail!("not focused") };
     assert!(rig.rig().glass(rig.now()).distance(position) <= tolerance);
@@ -95,6 +97,94 @@ fn one_way_is_half_the_way() -> Result<()> {
 }
 
 #[test]
+fn the_faster_the_shorter_and_every_speed_is_right() -> Result<()> {
+    let mut elapsed = Vec::new();
+    for pace in Pace::ALL {
+        let mut rig = VirtualRig::new(&config("")?)?;
+        let request = FocusRequest { pace: Some(pace), ..FocusRequest::default() };
+        let report = rig.focus(request, |_, _, _| {})?;
+        let answer = report.answer.context("an answer")?;
+        let (error, bar) = (error_of(&rig, &report)?, answer.error_bar.context("an error bar")?);
+        println!("{}: error {error:+.1} of {bar:.1} in {:?}", pace.name(), report.elapsed());
+        assert!(error.abs() < 3.0 * bar && bar < 30.0, "{}: {error} of {bar}", pace.name());
+        assert!(answer.confidence.is_some_and(|confidence| confidence > 0.5));
+        assert_eq!(report.sweeps().count(), if pace == Pace::Fast { 1 } else { 2 });
+        elapsed.push(report.elapsed());
+    }
+    assert!(elapsed.is_sorted() && elapsed[0] * 3 < elapsed[2] * 2, "{elapsed:?}");
+    Ok(())
+}
+
+#[test]
+fn of_two_depths_the_one_asked_for_is_focused() -> Result<()> {
+    let scene = "[simulation]\nscene = \"two-depths\"\nfocus_counts = 1500\nsecond_focus_counts = 2500\n";
+    // Quicker runs end beyond the first depth that they are sure of.
+    let accurate = config(&format!("{scene}[focus]\nspeed = \"accurate\""))?;
+    let both = run(&accurate)?.1.answer.context("an answer")?;
+    assert!(both.flags.contains(Flag::TwoDepths));
+    let second = both.second_depth.context("a second depth")?;
+    assert!((both.position.distance(second) - 1000.0).abs() < 50.0, "{both:?}");
+    let windows = |rectangles: &[(u16, u16)]| {
+        let mut windows = Windows::default();
+        for (place, &(x, width)) in windows.iter_mut().zip(rectangles) {
+            *place = Some(Window { x, y: 0, width, height: 260 });
+        }
+        windows
+    };
+    let (left, right) = ((0, 160), (186, 160));
+    let nearest = Some(Prefer::Nearest);
+    for (pace, nearest_at, windows, prefer, expected) in [
+        (Pace::Normal, "max", windows(&[]), nearest, 2500.0),
+        (Pace::Fast, "min", windows(&[]), nearest, 1500.0),
+        (Pace::Fast, "max", windows(&[left]), None, 1500.0),
+        (Pace::Normal, "max", windows(&[right]), None, 2500.0),
+        (Pace::Fast, "max", windows(&[left, right]), nearest, 2500.0),
+        (Pace::Accurate, "min", windows(&[left, right]), nearest, 1500.0),
+        (Pace::Normal, "max", windows(&[left, right]), Some(Prefer::Window(0)), 1500.0),
+    ] {
+        let text = format!("{scene}[focus]\nnearest_at = \"{nearest_at}\"");
+        let mut rig = VirtualRig::new(&config(&text)?)?;
+        let request = FocusRequest { windows, prefer, pace: Some(pace), ..FocusRequest::default() };
+        let report = rig.focus(request, |_, _, _| {})?;
+        let case = format!("{} {nearest_at} {prefer:?} {windows:?}: {:?}", pace.name(), report.outcome);
+        let Outcome::Focused { position } = report.outcome else { anyhow::bail!(case) };
+        assert!(position.distance(LensPosition(expected)) < 30.0, "{case}");
+        let window = report.answer.and_then(|answer| answer.window);
+        assert_eq!(window.is_some(), windows[0].is_some(), "{case}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_way_back_that_says_nothing_leaves_the_answer_of_the_way_there() -> Result<()> {
+    let text = "[simulation]\nscene = \"text\"\nfocus_counts = 2146\nshake_px_rms = 2\nseed = 2";
+    let mut shaken = config(text)?;
+    shaken.rig.motion.roll_rad_rms = 0.003;
+    let (rig, report) = run(&shaken)?;
+    let answer = report.answer.context("an answer")?;
+    assert!(answer.flags.contains(Flag::Weak), "{answer:?}");
+    let error = error_of(&rig, &report)?;
+    assert!(error.abs() < 3.0 * answer.error_bar.context("an error bar")?, "{error}: {answer:?}");
+    Ok(())
+}
+
+#[test]
+fn sweeps_there_and_back_teach_the_delay() -> Result<()> {
+    let mut rig = VirtualRig::new(&config("")?)?;
+    let unsure = rig.controller().delays().at(0.0).uncertainty_s;
+    for runs in 1..=3 {
+        rig.focus(FocusRequest::default(), |_, _, _| {})?;
+        assert_eq!(rig.controller().delays().measurements, runs);
+    }
+    assert!(rig.controller().delays().at(0.0).uncertainty_s < 0.7 * unsure);
+    let one_way = FocusRequest { pace: Some(Pace::Fast), ..FocusRequest::default() };
+    let report = rig.focus(one_way, |_, _, _| {})?;
+    assert!(error_of(&rig, &report)?.abs() < 5.0);
+    assert_eq!(rig.controller().delays().measurements, 3, "one way says nothing of the delay");
+    Ok(())
+}
+
+#[test]
 fn every_method_runs_through_the_loop() -> Result<()> {
     for method in Method::ALL {
         let mut rig = VirtualRig::new(&config("")?)?;
@@ -106,7 +196,9 @@ fn every_method_runs_through_the_loop() -> Result<()> {
         let report = rig.focus(request, |_, _, _| {})?;
         let error = error_of(&rig, &report)?;
         println!("{method}: error {error:+.1}");
-        assert!(error.abs() < 500.0, "{method}: {error}");
+        // The event rate has its humps beside focus.
+        let limit = if method.reads_every_event() && method != Method::ErSquared { 20.0 } else { 500.0 };
+        assert!(error.abs() < limit, "{method}: {error}");
     }
     Ok(())
 }
@@ -116,7 +208,7 @@ fn what_the_rig_cannot_do_ends_with_its_named_reason() -> Result<()> {
     let second = std::time::Duration::from_secs(1);
     let lost = FaultKind::EventLoss { share: 0.5, duration: 10 * second };
     let late = FaultKind::LensPositionLate { by: 3 * second / 10 };
-    let cases = [
+    let cases = vec![
         ("lens-not-moving", fault(FaultKind::LensStalled, FaultTrigger::After(second / 2))?),
         ("lens-stopped-short", fault(FaultKind::LensStalled, MIDWAY)?),
         ("lens-lost", fault(FaultKind::LensUnplugged, MIDWAY)?),
@@ -199,7 +291,7 @@ fn a_lens_is_homed_before_its_first_run_and_not_moved_before() -> Result<()> {
     let mut rig = VirtualRig::new(&homing)?;
     assert!(matches!(rig.command(Command::MoveTo(LensPosition(500.0))), Err(Refusal::NotHomed)));
     let report = rig.focus(FocusRequest::default(), |_, _, _| {})?;
-    assert!(error_of(&rig, &report)?.abs() < 60.0);
+    assert!(error_of(&rig, &report)?.abs() < 10.0);
     assert!(!report.phases[Phase::Homing as usize].is_zero());
     let again = rig.focus(FocusRequest::default(), |_, _, _| {})?;
     assert!(again.phases[Phase::Homing as usize].is_zero(), "once is enough");

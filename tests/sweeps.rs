@@ -5,7 +5,7 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
-use evfocus_core::search::{ApexFinder, StructureKernel};
+use evfocus_core::search::{ApexFinder, Bookings};
 use evfocus_core::{
     CameraMicros, Event, LensPosition, Method, Polarity, SearchError, Searcher, SweepCapacity, SweepQuality,
     SweepRecorder,
@@ -181,10 +181,10 @@ fn structure_does_not_mind_events_that_have_nothing_to_do_with_the_picture() -> 
 fn structure_without_its_rule_for_turning_points_lags() -> anyhow::Result<()> {
     let sweep = RecordedSweep::read(&committed(), "light_static")?;
     let (low, high) = sweep.trace.extent().unwrap_or_default();
-    let bins_per_count = (StructureKernel::BINS - 1) as f64 / high.distance(low);
+    let bins_per_count = (Bookings::BINS - 1) as f64 / high.distance(low);
     let stride = usize::from(sweep.geometry.width) + 4;
     let mut state = vec![0_i64; stride * (usize::from(sweep.geometry.height) + 4)];
-    let mut growth = [0_i64; StructureKernel::BINS];
+    let mut growth = [0_i64; Bookings::BINS];
     for event in &sweep.events {
         let position = sweep.trace.position_near(event.t.0 as f64).unwrap_or_default();
         let place = (usize::from(event.y) + 2) * stride + usize::from(event.x) + 2;
@@ -196,7 +196,15 @@ fn structure_without_its_rule_for_turning_points_lags() -> anyhow::Result<()> {
         growth[(position.counts_from(low) * bins_per_count) as usize] += sign * (cross(1) - cross(2));
         state[place] += sign;
     }
-    let apex = ApexFinder::new().find(&growth);
+    let mut energy = 0.0;
+    let curve: Vec<f64> = growth
+        .iter()
+        .map(|&growth| {
+            energy += growth as f64;
+            energy
+        })
+        .collect();
+    let apex = ApexFinder::new().find(&curve, 0.85).ok_or_else(|| anyhow::anyhow!("no curve"))?;
     let plain = low.0 + apex.at / bins_per_count - sweep.truth.0;
     let ours = structure(&sweep, &with_events(&sweep, &sweep.events))??;
     println!("plain {plain:+.1}, with the rule {ours:+.1}");
