@@ -42,7 +42,7 @@ const FENCES: [(&str, &[&str]); 6] = [
     ("clap", &["evfocusd", "evfocus"]),
     ("plotters", &["evfocus-eval", "evfocus"]),
     ("image", &["evfocus-eval"]),
-    ("rand", &["evfocus-eval", "hil-sim"]),
+    ("rand", &["evfocus-eval", "evfocus-tests", "hil-sim"]),
 ];
 
 fn root() -> PathBuf {

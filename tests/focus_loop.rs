@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use evfocus_core::controller::{Command, FocusRequest, FocusState, Mode, Pace, Refusal};
 use evfocus_core::{
-    Directions, Flag, LensPosition, LensSpeed, Method, Outcome, Phase, Prefer, RunReport, Window, Windows,
+    Directions, Failure, Flag, LensPosition, LensSpeed, Method, Outcome, Phase, Prefer, RunReport, Suspicion,
+    Window, Windows,
 };
 use evfocusd::{Config, VirtualRig, VirtualRigError};
 use hil_sim::{Fault, FaultKind, FaultTrigger, Flicker};
@@ -82,6 +83,27 @@ fn a_worn_lens_is_brought_to_its_answer_past_backlash() -> Result<()> {
         glass.distance(position) <= rig.controller().config().position_tolerance + 3.0,
         "{glass} {position}"
     );
+    Ok(())
+}
+
+#[test]
+fn play_is_found_and_once_it_is_known_taken_off() -> Result<()> {
+    let with_play = |known: f64| -> Result<(VirtualRig, RunReport)> {
+        let mut config = config(&format!("[lens]\nbacklash_counts = {known}"))?;
+        config.rig.lens.backlash = 80.0;
+        run(&config)
+    };
+    let (_, report) = with_play(0.0)?;
+    let Outcome::Failed(failure) = report.outcome else { anyhow::bail!("{:?}", report.outcome) };
+    println!("{failure}");
+    assert_eq!(failure.name(), "direction-mismatch");
+    let Failure::DirectionMismatch { suspicion: Suspicion::Backlash { counts }, .. } = failure else {
+        anyhow::bail!("{failure:?}")
+    };
+    assert!((counts - 80.0).abs() < 16.0, "{counts}");
+    let (rig, report) = with_play(80.0)?;
+    let error = error_of(&rig, &report)?;
+    assert!(error.abs() < 10.0, "{error}");
     Ok(())
 }
 

@@ -7,8 +7,9 @@ use std::path::PathBuf;
 
 use evfocus_core::search::{ApexFinder, Bookings};
 use evfocus_core::{
-    CameraMicros, Event, LensPosition, Method, Polarity, SearchError, Searcher, SweepCapacity, SweepQuality,
-    SweepRecorder,
+    Analyzer, Answer, CameraMicros, Event, Failure, Flag, LegReport, LensPosition, LensRange, Method,
+    Polarity, Question, Rules, SearchError, Searcher, SweepCapacity, SweepLimits, SweepQuality,
+    SweepRecorder, answer,
 };
 use evfocus_tests::recorded_sweeps::{RecordedSweep, Reference, committed};
 
@@ -112,6 +113,21 @@ fn structure(sweep: &RecordedSweep, leg: &SweepRecorder) -> anyhow::Result<Resul
     Ok(answer.map(|answer| answer.position.counts_from(sweep.truth)))
 }
 
+/// What `auto` makes of it, by the daemon's rules.
+fn judged(sweep: &RecordedSweep, leg: &SweepRecorder) -> anyhow::Result<Result<Answer, Failure>> {
+    let (low, high) = sweep.trace.extent().unwrap_or_default();
+    let question = Question {
+        method: Method::Auto,
+        interval: Duration::from_millis(55),
+        limits: SweepLimits::default(),
+        ask_all: false,
+    };
+    let mut report = LegReport::empty();
+    let verdict = Analyzer::new(sweep.geometry).analyze(leg, &sweep.trace, question, &mut report);
+    let rules = Rules::for_range(LensRange::new(low, high)?);
+    Ok(verdict.and_then(|()| answer(&report, None, Method::Auto, &rules)))
+}
+
 /// `sweep` with other events.
 fn with_events(sweep: &RecordedSweep, events: &[Event]) -> SweepRecorder {
     let capacity = SweepCapacity { events: events.len(), ..SweepCapacity::default() };
@@ -148,9 +164,14 @@ fn structure_says_that_pixels_in_disorder_are_no_picture() -> anyhow::Result<()>
             let place = places[usize::from(event.y) * width + usize::from(event.x)];
             (event.x, event.y) = ((place % width) as u16, (place / width) as u16);
         }
-        let answer = structure(&sweep, &with_events(&sweep, &events))?;
+        // What is left of the picture's energy without its structure is highest at focus too, if it has the right sign by chance.
+        let answer = judged(&sweep, &with_events(&sweep, &events))?;
         println!("{:28} {answer:?}", row.name);
-        assert!(matches!(answer, Err(SearchError::Weak { .. })), "{}: {answer:?}", row.name);
+        let is_weak = answer.map_or_else(
+            |failure| matches!(failure, Failure::Weak { .. } | Failure::Saturated),
+            |answer| answer.flags.contains(Flag::Weak) && answer.confidence.is_some_and(|sure| sure < 0.9),
+        );
+        assert!(is_weak, "{}: {answer:?}", row.name);
     }
     Ok(())
 }

@@ -1,3 +1,4 @@
 //! What the workspace tests share.
 
+pub mod random_runs;
 pub mod recorded_sweeps;

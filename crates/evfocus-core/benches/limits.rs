@@ -10,8 +10,10 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use evfocus_core::search::Travel;
 use evfocus_core::{
-    CameraMicros, CumulativeCounter, Event, Geometry, Method, Searcher, SweepCapacity, SweepRecorder,
+    Analyzer, CameraMicros, CumulativeCounter, Event, Geometry, LegReport, Method, Question, Searcher,
+    SweepCapacity, SweepLimits, SweepRecorder,
 };
 
 #[path = "support/sweep.rs"]
@@ -23,8 +25,12 @@ const MOST_US_PER_SEARCH: f64 = 100.0;
 const MOST_TIMES_LONGER: f64 = 1.5;
 /// `structure` goes over every event; a million, a busy sweep of this sensor, then take no longer than a lens does to start.
 const MOST_NS_PER_EVENT_READ: f64 = 25.0;
-/// And nobody waits for the answer.
+/// All that `auto` does of an event, live and afterwards.
+const MOST_NS_PER_EVENT_OF_AUTO: f64 = 60.0;
+/// And nobody waits for the answer, even of a sweep of two million events.
 const MOST_MS_FOR_A_RESULT: f64 = 50.0;
+/// Whether the sweep may end is asked while events come in.
+const MOST_MS_TO_DECIDE: f64 = 5.0;
 const SMALL: Geometry = Geometry { width: 346, height: 260 };
 const REPEATS: usize = 8;
 /// Batches of [`sweep::BATCH`] events: 100 million events.
@@ -102,6 +108,60 @@ fn structure_of(events: &[Event]) -> Result<f64, Box<dyn Error>> {
     Ok(times.min().unwrap_or_default().as_secs_f64())
 }
 
+/// What `auto` costs in a run.
+struct Auto {
+    ns_per_event: f64,
+    ms_for_the_result: f64,
+    ms_to_decide: f64,
+}
+
+/// A sweep of two million events, taken live as the controller does it, batch by batch.
+fn auto() -> Result<Auto, Box<dyn Error>> {
+    let mut events = sweep::batch(0, sweep::SWEEP_US / 2);
+    events.extend(
+        sweep::batch(0, sweep::SWEEP_US / 2)
+            .into_iter()
+            .map(|event| Event { t: CameraMicros(event.t.0 + sweep::SWEEP_US / 2), ..event }),
+    );
+    for event in &mut events {
+        event.x %= SMALL.width;
+        event.y %= SMALL.height;
+    }
+    let trace = sweep::trace();
+    let (from, to) = (trace.first().ok_or("no trace")?.1, trace.last().ok_or("no trace")?.1);
+    let mut recorder =
+        SweepRecorder::new(SMALL, SweepCapacity { events: events.len(), ..SweepCapacity::default() });
+    let mut analyzer = Analyzer::new(SMALL);
+    let question = Question {
+        method: Method::Auto,
+        interval: Duration::from_millis(55),
+        limits: SweepLimits::default(),
+        ask_all: false,
+    };
+    let mut report = LegReport::empty();
+    let (mut live, mut result, mut decision) = (Duration::MAX, Duration::MAX, Duration::MAX);
+    for _ in 0..2 * REPEATS {
+        recorder.start(CameraMicros(0));
+        analyzer.begin(Travel::new(from, to)?);
+        recorder.feed(&events);
+        let begin = Instant::now();
+        analyzer.take(&recorder, &trace);
+        live = live.min(begin.elapsed());
+        let begin = Instant::now();
+        black_box(analyzer.has_passed_peak());
+        decision = decision.min(begin.elapsed());
+        let begin = Instant::now();
+        // Events by chance make no picture; all the work is done before that is said.
+        assert!(black_box(analyzer.analyze(&recorder, &trace, question, &mut report)).is_err());
+        result = result.min(begin.elapsed());
+    }
+    Ok(Auto {
+        ns_per_event: (live + result).as_secs_f64() * 1e9 / events.len() as f64,
+        ms_for_the_result: result.as_secs_f64() * 1e3,
+        ms_to_decide: decision.as_secs_f64() * 1e3,
+    })
+}
+
 fn within(what: &str, figure: f64, limit: f64, unit: &str) -> bool {
     let verdict = if figure <= limit { "pass" } else { "FAIL" };
     println!("{verdict}  {what}: {figure:.3} {unit}, limit {limit} {unit}, {:.2} of it", figure / limit);
@@ -146,5 +206,11 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     all_within &= within(what, each, MOST_NS_PER_EVENT_READ, "ns/event");
     let what = "structure, for the result after the last event";
     all_within &= within(what, result, MOST_MS_FOR_A_RESULT, "ms");
+    let auto = auto()?;
+    let what = "auto on 2 M events at 346 x 260, for each";
+    all_within &= within(what, auto.ns_per_event, MOST_NS_PER_EVENT_OF_AUTO, "ns/event");
+    let what = "auto on 2 M events, for the result after the last event";
+    all_within &= within(what, auto.ms_for_the_result, MOST_MS_FOR_A_RESULT, "ms");
+    all_within &= within("auto, whether the sweep may end", auto.ms_to_decide, MOST_MS_TO_DECIDE, "ms");
     Ok(if all_within { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

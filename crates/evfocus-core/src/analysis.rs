@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use crate::event::{Geometry, Window};
+use crate::event::{Event, Geometry, Window};
 use crate::lens_trace::LensTrace;
 use crate::quality::SweepQuality;
 use crate::report::{Failure, LegReport};
@@ -74,16 +74,31 @@ impl Analyzer {
         self.searcher.structure().set_windows(windows);
     }
 
+    /// The lens has come to rest before its sweep; what was seen before is forgotten.
+    pub fn begin_rest(&mut self) {
+        self.searcher.structure().begin_rest();
+    }
+
+    /// Takes events made while the lens rests.
+    pub fn observe_rest(&mut self, events: &[Event]) {
+        self.searcher.structure().observe_rest(events);
+    }
+
+    /// The rest is over.
+    pub fn end_rest(&mut self) {
+        self.searcher.structure().end_rest();
+    }
+
     /// Begins to take the events of a sweep along `travel` as they come, so that little is left to do at its end.
     pub fn begin(&mut self, travel: Travel) {
-        self.searcher.structure().begin(travel);
+        self.searcher.begin(travel);
         self.has_begun = true;
     }
 
     /// Takes the events of `recorder` up to the newest position of `trace`.
     pub fn take(&mut self, recorder: &SweepRecorder, trace: &LensTrace<CameraMicros>) {
         if let (true, Some((newest, _))) = (self.has_begun, trace.last()) {
-            self.searcher.structure().take(recorder.store(), trace, newest);
+            self.searcher.take(recorder.store(), trace, newest);
         }
     }
 
@@ -115,22 +130,23 @@ impl Analyzer {
         let sweep = sweep.ok_or(too_few)?;
         let quality = SweepQuality::of(&sweep).map_err(|error| Failure::NoAnswer(error.into()))?;
         report.quality = quality;
-        if question.asks(Method::Structure) {
+        if question.asks(Method::Structure) || question.asks(Method::MirrorPairs) {
             if !has_begun {
-                self.searcher.structure().begin(Travel::of(&sweep).map_err(Failure::NoAnswer)?);
+                self.searcher.begin(Travel::of(&sweep).map_err(Failure::NoAnswer)?);
             }
-            self.ask_structure(&sweep, report);
+            if question.asks(Method::Structure) {
+                self.ask_structure(&sweep, report);
+            }
         }
         for other in Method::ALL.into_iter().filter(|&other| question.asks(other)) {
             let said = match other {
                 Method::Structure | Method::Auto => report
                     .structure
-                    .map(|said| said.as_ref().map(StructureAnswer::estimate).map_err(|&error| error)),
-                Method::Egs
-                | Method::EgsOfficial
-                | Method::ErFixed
-                | Method::ErSquared
-                | Method::MirrorPairs => Some(self.searcher.search(other, &sweep, question.interval)),
+                    .map(|said| said.and_then(StructureAnswer::significant).map(|answer| answer.estimate())),
+                Method::MirrorPairs => Some(self.searcher.mirror_pairs(&sweep)),
+                Method::Egs | Method::EgsOfficial | Method::ErFixed | Method::ErSquared => {
+                    Some(self.searcher.search(other, &sweep, question.interval))
+                }
             };
             if let Some(place) = report.estimates.get_mut(other as usize) {
                 *place = said;

@@ -1,10 +1,16 @@
 //! One answer from one sweep or two, how sure it is, and whether to believe it.
 
+mod both_ways;
+mod chosen;
+
 use crate::delay::{Delay, DelayModel};
 use crate::flags::{Flag, Flags};
 use crate::report::{Failure, LegReport, Suspicion};
-use crate::search::{Method, SearchError, StructureAnswer};
+use crate::search::{Method, SearchError};
 use crate::units::{LensPosition, LensRange};
+
+use both_ways::by_structure_both_ways;
+use chosen::{Chosen, leg_flags};
 
 /// Which of several answers counts: of the windows of a request, or of two depths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -58,6 +64,8 @@ pub struct Rules {
     pub largest_mismatch_share: f64,
     /// How late the pixels are.
     pub delays: DelayModel,
+    /// Known play between what the lens reports and the glass, counts: the way back reads so much less.
+    pub backlash: f64,
     /// Which answer counts.
     pub prefer: Prefer,
     /// Whether nearer subjects are sharp at higher positions.
@@ -76,6 +84,7 @@ impl Rules {
             edge_share: 0.02,
             largest_mismatch_share: 0.15,
             delays: DelayModel::default(),
+            backlash: 0.0,
             prefer: Prefer::Strongest,
             nearest_is_high: true,
         }
@@ -99,7 +108,7 @@ pub struct Answer {
     pub second_depth: Option<LensPosition>,
     /// The window that won, from 0.
     pub window: Option<u8>,
-    /// Half of forward less backward, counts: lag plus backlash, if both mean the same peak.
+    /// Half of forward less backward, counts, known backlash taken off: the lag, and what backlash is not known.
     pub half_difference: Option<f64>,
     /// Full width of the peak at half its height, counts.
     pub width: Option<f64>,
@@ -143,7 +152,7 @@ pub fn answer(
     rules: &Rules,
 ) -> Result<Answer, Failure> {
     let found = match (method, second) {
-        (Method::Structure | Method::Auto, None) => by_structure(&Chosen::of(first, rules)?, rules),
+        (Method::Structure | Method::Auto, None) => by_structure_one_way(first, rules)?,
         (Method::Structure | Method::Auto, Some(second)) => by_structure_both_ways(first, second, rules)?,
         (
             Method::Egs | Method::EgsOfficial | Method::ErFixed | Method::ErSquared | Method::MirrorPairs,
@@ -162,90 +171,12 @@ pub fn is_at_edge(answer: LensPosition, range: LensRange, edge_share: f64) -> bo
     !range.contains(answer) || to_edge < edge_share * range.length()
 }
 
-/// The answer of a sweep that counts, and which one that is.
-#[derive(Debug, Clone, Copy)]
-struct Chosen {
-    structure: StructureAnswer,
-    position: LensPosition,
-    second_depth: Option<LensPosition>,
-    window: Option<u8>,
-    flags: Flags,
+fn by_structure_one_way(leg: &LegReport, rules: &Rules) -> Result<Answer, Failure> {
+    Ok(by_structure(Chosen::of(leg, rules)?.alone(rules)?, rules))
 }
 
-impl Chosen {
-    fn of(leg: &LegReport, rules: &Rules) -> Result<Self, Failure> {
-        let (structure, window) = choose(leg, rules)?;
-        let (mut position, mut second_depth) = (structure.position, structure.rival);
-        if let (Some(rival), Prefer::Nearest) = (structure.rival, rules.prefer)
-            && is_nearer(rival, position, rules)
-        {
-            second_depth = Some(core::mem::replace(&mut position, rival));
-        }
-        let mut flags = leg_flags(leg);
-        flags.set(Flag::TwoDepths, structure.rival.is_some());
-        flags.set(Flag::Edge, structure.is_at_edge);
-        flags.set(Flag::Flat, structure.is_flat);
-        flags.set(Flag::Coarse, structure.is_coarse);
-        let chosen = Self { structure, position, second_depth, window, flags };
-        if structure.is_unsure {
-            return Err(Failure::Unsure {
-                position: chosen.without_delay(chosen.position, rules),
-                error_bar: structure.scatter,
-            });
-        }
-        Ok(chosen)
-    }
-
-    fn delay(&self, rules: &Rules) -> Delay {
-        rules.delays.at(self.structure.noise_hz)
-    }
-
-    fn without_delay(&self, position: LensPosition, rules: &Rules) -> LensPosition {
-        LensPosition(position.0 - self.structure.velocity * self.delay(rules).seconds)
-    }
-}
-
-fn is_nearer(one: LensPosition, other: LensPosition, rules: &Rules) -> bool {
-    (one > other) == rules.nearest_is_high
-}
-
-/// The answer of the whole picture, or that of the preferred window if there are windows.
-fn choose(leg: &LegReport, rules: &Rules) -> Result<(StructureAnswer, Option<u8>), Failure> {
-    let not_asked = Failure::NoAnswer(SearchError::NoLength { at_us: leg.start.0 });
-    if leg.windows.first().is_none_or(Option::is_none) {
-        return Ok((leg.structure.ok_or(not_asked)?.map_err(Failure::of_search)?, None));
-    }
-    let mut best: Option<(StructureAnswer, u8)> = None;
-    let mut first_error = not_asked;
-    for (index, (_, said)) in leg.windows.iter().flatten().enumerate() {
-        match (said, rules.prefer) {
-            (_, Prefer::Window(wanted)) if usize::from(wanted) != index => {}
-            (Err(error), _) => first_error = Failure::of_search(*error),
-            (Ok(said), prefer) => {
-                let wins = best.is_none_or(|(best, _)| match prefer {
-                    Prefer::Nearest => is_nearer(said.position, best.position, rules),
-                    Prefer::Strongest | Prefer::Window(_) => said.significance > best.significance,
-                });
-                if wins {
-                    best = Some((*said, index as u8));
-                }
-            }
-        }
-    }
-    best.map(|(answer, window)| (answer, Some(window))).ok_or(first_error)
-}
-
-fn leg_flags(leg: &LegReport) -> Flags {
-    let mut flags = Flags::default();
-    flags.set(Flag::Saturated, leg.quality.is_saturated());
-    flags.set(Flag::Flat, leg.quality.is_flat());
-    flags.set(Flag::Flicker, leg.quality.has_flicker());
-    flags.set(Flag::EventsLost, leg.lost > 0);
-    flags
-}
-
-fn by_structure(chosen: &Chosen, rules: &Rules) -> Answer {
-    let Chosen { structure, position, second_depth, window, flags } = *chosen;
+fn by_structure(chosen: Chosen, rules: &Rules) -> Answer {
+    let Chosen { structure, position, second_depth, window, flags } = chosen;
     let late = libm::fabs(structure.velocity) * chosen.delay(rules).uncertainty_s;
     Answer {
         second_depth: second_depth.map(|second| chosen.without_delay(second, rules)),
@@ -254,69 +185,6 @@ fn by_structure(chosen: &Chosen, rules: &Rules) -> Answer {
         ..Answer::bare(chosen.without_delay(position, rules), Method::Structure, flags)
     }
     .sure_to(libm::hypot(structure.scatter, late), rules)
-}
-
-fn by_structure_both_ways(first: &LegReport, second: &LegReport, rules: &Rules) -> Result<Answer, Failure> {
-    let there = Chosen::of(first, rules)?;
-    // The way back is asked for the same thing.
-    let same = Rules { prefer: there.window.map_or(rules.prefer, Prefer::Window), ..*rules };
-    let mut back = Chosen::of(second, &same)?;
-    // Which of two depths is the stronger may differ from one way to the other.
-    if let Some(other) = back.second_depth
-        && other.distance(there.position) < back.position.distance(there.position)
-    {
-        back.second_depth = Some(core::mem::replace(&mut back.position, other));
-    }
-    let speed = f64::midpoint(libm::fabs(there.structure.velocity), libm::fabs(back.structure.velocity));
-    let towards = if there.structure.velocity < 0.0 { -1.0 } else { 1.0 };
-    let noise_hz = f64::midpoint(there.structure.noise_hz, back.structure.noise_hz);
-    let expected = rules.delays.at(noise_hz);
-    let half_difference = there.position.counts_from(back.position) / 2.0;
-    let scatter = libm::hypot(there.structure.scatter, back.structure.scatter) / 2.0;
-    let excess = half_difference * towards - speed * expected.seconds;
-    let uncertainty = libm::hypot(scatter, speed * expected.uncertainty_s);
-    // Where the answers themselves agree, a delay other than expected is no fault: the expectation was wrong.
-    let agree = libm::fabs(half_difference) <= rules.tolerance / 2.0;
-    if !agree && libm::fabs(excess) > (3.0 * uncertainty).max(rules.tolerance / 2.0) {
-        return Err(Failure::DirectionMismatch {
-            forward: there.position,
-            backward: back.position,
-            suspicion: suspicion(excess, there.structure.width),
-        });
-    }
-    // What exceeds chance may be backlash, half of which stays in the mean.
-    let beyond = (excess * excess - uncertainty * uncertainty).max(0.0) / 4.0;
-    let mean = |one: LensPosition, other: LensPosition| LensPosition(f64::midpoint(one.0, other.0));
-    let second_depth = match (there.second_depth, back.second_depth) {
-        (Some(one), Some(other)) => Some(mean(one, other)),
-        (Some(one), None) => Some(there.without_delay(one, rules)),
-        (None, Some(other)) => Some(back.without_delay(other, rules)),
-        (None, None) => None,
-    };
-    let measured = (speed > 0.0).then(|| {
-        let delay = Delay { seconds: half_difference * towards / speed, uncertainty_s: scatter / speed };
-        (noise_hz, delay)
-    });
-    let flags = there.flags.or(back.flags);
-    let answer = Answer {
-        second_depth,
-        window: there.window,
-        half_difference: Some(half_difference),
-        width: Some(there.structure.width),
-        measured,
-        ..Answer::bare(mean(there.position, back.position), Method::Structure, flags)
-    };
-    Ok(answer.sure_to(libm::sqrt(scatter * scatter + beyond), rules))
-}
-
-fn suspicion(excess: f64, width: f64) -> Suspicion {
-    if libm::fabs(excess) > width / 2.0 {
-        Suspicion::DifferentPeaks
-    } else if excess > 0.0 {
-        Suspicion::Backlash
-    } else {
-        Suspicion::LatePositions
-    }
 }
 
 fn by_other(
@@ -348,7 +216,7 @@ fn by_other(
     }
     // These methods do not know how far off they are; where `structure` has an answer, the difference to it tells.
     let structure = match second {
-        None => Chosen::of(first, rules).map(|chosen| by_structure(&chosen, rules)),
+        None => by_structure_one_way(first, rules),
         Some(second) => by_structure_both_ways(first, second, rules),
     };
     Ok(match structure {
@@ -375,6 +243,90 @@ fn confidence(error_bar: f64, flags: Flags, tolerance: f64) -> f64 {
         (Flag::Flat, 0.8),
         (Flag::Flicker, 0.9),
         (Flag::Coarse, 0.85),
+        (Flag::Weak, 0.85),
+        (Flag::Unsure, 0.85),
     ];
     doubts.iter().filter(|(flag, _)| flags.contains(*flag)).fold(within, |within, (_, doubt)| within * doubt)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::{Bookings, StructureAnswer, TileAnswer};
+
+    /// What a good sweep says.
+    pub(super) fn structure_answer(position: f64, scatter: f64, velocity: f64) -> StructureAnswer {
+        StructureAnswer {
+            position: LensPosition(position),
+            width: 400.0,
+            significance: 60.0,
+            scatter,
+            noise_hz: 0.0,
+            velocity,
+            rival: None,
+            is_coarse: false,
+            is_unsure: false,
+            is_at_edge: false,
+            is_flat: false,
+            tiles: [TileAnswer::default(); Bookings::TILES],
+            passes: 1,
+            t_us: 0.0,
+            interval_us: 0.0,
+        }
+    }
+
+    fn leg(structure: StructureAnswer) -> LegReport {
+        LegReport { structure: Some(Ok(structure)), ..LegReport::empty() }
+    }
+
+    fn rules() -> Rules {
+        Rules::for_range(LensRange::new(LensPosition(0.0), LensPosition(3500.0)).unwrap())
+    }
+
+    fn both(there: StructureAnswer, back: StructureAnswer) -> Result<Answer, Failure> {
+        answer(&leg(there), Some(&leg(back)), Method::Auto, &rules())
+    }
+
+    #[test]
+    fn two_weak_ways_that_agree_are_believed_and_one_is_not() {
+        let (there, back) = (structure_answer(1006.0, 9.0, 1000.0), structure_answer(994.0, 9.0, -1000.0));
+        let weak = |answer, significance| StructureAnswer { significance, ..answer };
+        let agreed = both(weak(there, 9.0), weak(back, 9.0)).unwrap();
+        assert!((agreed.position.0 - 1000.0).abs() < 1.0 && agreed.flags.contains(Flag::Weak), "{agreed:?}");
+        let alone = answer(&leg(weak(there, 9.0)), None, Method::Auto, &rules());
+        assert!(matches!(alone, Err(Failure::Weak { .. })), "{alone:?}");
+        let elsewhere = structure_answer(2500.0, 9.0, -1000.0);
+        let apart = both(weak(there, 9.0), elsewhere);
+        assert!(matches!(apart, Err(Failure::DirectionMismatch { .. })), "{apart:?}");
+        let too_faint = both(weak(there, 9.0), weak(back, 5.0));
+        assert!(matches!(too_faint, Err(Failure::Weak { .. })), "{too_faint:?}");
+    }
+
+    #[test]
+    fn a_fairly_high_peak_is_believed_if_its_readings_agree() {
+        let fair =
+            |scatter| StructureAnswer { significance: 11.0, ..structure_answer(1006.0, scatter, 1000.0) };
+        let believed = answer(&leg(fair(12.0)), None, Method::Auto, &rules()).unwrap();
+        assert!(believed.flags.contains(Flag::Weak), "{believed:?}");
+        let refused = answer(&leg(fair(60.0)), None, Method::Auto, &rules());
+        assert!(matches!(refused, Err(Failure::Weak { .. })), "{refused:?}");
+    }
+
+    #[test]
+    fn a_way_that_says_nothing_leaves_the_other() {
+        let (there, back) = (structure_answer(1006.0, 9.0, 1000.0), structure_answer(994.0, 9.0, -1000.0));
+        let unsure = |answer| StructureAnswer { is_unsure: true, ..answer };
+        let far = |answer: StructureAnswer| StructureAnswer { position: LensPosition(3000.0), ..answer };
+        for (there, back) in [(there, far(unsure(back))), (far(unsure(there)), back)] {
+            let found = both(there, back).unwrap();
+            assert!((found.position.0 - 1000.0).abs() < 1.0, "{found:?}");
+            assert!(found.flags.contains(Flag::Unsure), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_highest_at_an_end_is_no_peak() {
+        let at_end = answer(&leg(structure_answer(3490.0, 9.0, 20_000.0)), None, Method::Auto, &rules());
+        assert!(matches!(at_end, Err(Failure::PeakAtEdge { .. })), "{at_end:?}");
+    }
 }

@@ -32,13 +32,13 @@ pub struct DelayModel {
 }
 
 impl Default for DelayModel {
-    /// What the pixel models of two public simulators have in common: 6 ms in light and 14 ms for each Hz of noise, give or take 3 ms
-    /// and, ours being less late in the dark than they are, 7 ms/Hz.
+    /// What the pixel models of two public simulators have in common: 6 ms in light and 14 ms for each Hz of noise, give or take 4 ms
+    /// and, ours being less late in the dark than they are, 9 ms/Hz.
     fn default() -> Self {
         Self {
             base_s: 0.006,
             per_hz_s: 0.014,
-            covariance: [0.003 * 0.003, 0.0, 0.007 * 0.007],
+            covariance: [0.004 * 0.004, 0.0, 0.009 * 0.009],
             measurements: 0,
         }
     }

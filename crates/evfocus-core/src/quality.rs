@@ -8,6 +8,9 @@ use crate::sweep::Sweep;
 pub struct SweepQuality {
     /// Share of the 5 ms windows whose rate lies above 90 % of the rate's 99th percentile: a rate that sits at a ceiling.
     pub share_at_ceiling: f64,
+    /// Variance over mean of the counts of neighbouring 5 ms windows at the ceiling: 1 for chance, near 0 for a rate that is held down.
+    /// A dark scene, in which noise is most of what there is, spends long at its ceiling too, but scatters.
+    pub ceiling_dispersion: f64,
     /// Variance over mean of the counts in 0.2 ms bins during the busiest half of the sweep: 1 for chance, near 0 for a read-out that
     /// is the bottleneck.
     pub regularity: f64,
@@ -33,10 +36,11 @@ impl SweepQuality {
     /// # Errors
     /// [`CounterError`] if the counter does not cover the sweep.
     pub fn of(sweep: &Sweep<'_>) -> Result<Self, CounterError> {
-        let (share_at_ceiling, busy_count) = share_at_ceiling(sweep)?;
+        let Ceiling { share, dispersion: ceiling_dispersion, busy_count } = Ceiling::of(sweep)?;
         let (flicker_hz, flicker_depth) = flicker(sweep)?;
         Ok(Self {
-            share_at_ceiling,
+            share_at_ceiling: share,
+            ceiling_dispersion,
             regularity: regularity(sweep, busy_count)?,
             dispersion: dispersion(sweep)?,
             flicker_hz,
@@ -44,12 +48,10 @@ impl SweepQuality {
         })
     }
 
-    /// The rate was capped by the read-out or the link: more than 30 % of the windows at the ceiling, or counts far more
-    /// regular than chance. The two rules hold on every saturated sweep tried and on no other (109 of them). An even rate
-    /// that scatters as chance does is not held down by anything.
+    /// The rate was capped by the read-out or the link: more than 30 % of the windows at the ceiling without the scatter of chance, or
+    /// counts far more regular than chance.
     pub fn is_saturated(&self) -> bool {
-        let is_chance = self.is_flat() && self.regularity > 0.5;
-        (self.share_at_ceiling > 0.3 && !is_chance) || self.regularity < 0.1
+        (self.share_at_ceiling > 0.3 && self.ceiling_dispersion < 0.5) || self.regularity < 0.1
     }
 
     /// The rate does not depend on the lens: its variation is what chance alone makes.
@@ -74,39 +76,64 @@ fn windows<'a>(sweep: &'a Sweep<'a>, width_us: f64) -> impl Iterator<Item = Resu
     })
 }
 
-fn share_at_ceiling(sweep: &Sweep<'_>) -> Result<(f64, f64), CounterError> {
-    let mut highest: f64 = 0.0;
-    let mut number = 0_u32;
-    for count in windows(sweep, CEILING_WINDOW_US) {
-        highest = highest.max(count?);
-        number += 1;
-    }
-    // Too short to speak of percentiles.
-    if number < 20 || highest <= 0.0 {
-        return Ok((0.0, 0.0));
-    }
-    let mut histogram = [0_u32; HISTOGRAM];
-    for count in windows(sweep, CEILING_WINDOW_US) {
-        let place = (count? / highest * (HISTOGRAM - 1) as f64) as usize;
-        if let Some(cell) = histogram.get_mut(place) {
-            *cell += 1;
+/// The rate at its highest.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Ceiling {
+    share: f64,
+    dispersion: f64,
+    /// The median count of a 5 ms window.
+    busy_count: f64,
+}
+
+impl Ceiling {
+    fn of(sweep: &Sweep<'_>) -> Result<Self, CounterError> {
+        let mut highest: f64 = 0.0;
+        let mut number = 0_u32;
+        for count in windows(sweep, CEILING_WINDOW_US) {
+            highest = highest.max(count?);
+            number += 1;
         }
+        // Too short to speak of percentiles.
+        if number < 20 || highest <= 0.0 {
+            return Ok(Self::default());
+        }
+        let mut histogram = [0_u32; HISTOGRAM];
+        for count in windows(sweep, CEILING_WINDOW_US) {
+            let place = (count? / highest * (HISTOGRAM - 1) as f64) as usize;
+            if let Some(cell) = histogram.get_mut(place) {
+                *cell += 1;
+            }
+        }
+        let percentile = |share: f64| {
+            let wanted = share * f64::from(number);
+            let mut below = 0.0;
+            let place = histogram.iter().position(|&cell| {
+                below += f64::from(cell);
+                below >= wanted
+            });
+            (place.unwrap_or(HISTOGRAM - 1) as f64 + 0.5) / (HISTOGRAM - 1) as f64 * highest
+        };
+        let ceiling = 0.9 * percentile(0.99);
+        let (mut at_ceiling, mut squares, mut sum) = (0_u32, 0.0, 0.0);
+        let mut before = 0.0;
+        for count in windows(sweep, CEILING_WINDOW_US) {
+            let count = count?;
+            if count > ceiling {
+                at_ceiling += 1;
+                // Differences of neighbours, so that a slow change of the rate drops out.
+                if before > ceiling {
+                    squares += (count - before) * (count - before) / 2.0;
+                    sum += f64::midpoint(before, count);
+                }
+            }
+            before = count;
+        }
+        Ok(Self {
+            share: f64::from(at_ceiling) / f64::from(number),
+            dispersion: if sum > 0.0 { squares / sum } else { 1.0 },
+            busy_count: percentile(0.5),
+        })
     }
-    let percentile = |share: f64| {
-        let wanted = share * f64::from(number);
-        let mut below = 0.0;
-        let place = histogram.iter().position(|&cell| {
-            below += f64::from(cell);
-            below >= wanted
-        });
-        (place.unwrap_or(HISTOGRAM - 1) as f64 + 0.5) / (HISTOGRAM - 1) as f64 * highest
-    };
-    let ceiling = 0.9 * percentile(0.99);
-    let mut at_ceiling = 0_u32;
-    for count in windows(sweep, CEILING_WINDOW_US) {
-        at_ceiling += u32::from(count? > ceiling);
-    }
-    Ok((f64::from(at_ceiling) / f64::from(number), percentile(0.5)))
 }
 
 /// Variance over mean of 0.2 ms counts within the 5 ms windows that hold at least `busy_count` events, with the slow change of

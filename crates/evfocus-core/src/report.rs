@@ -7,6 +7,7 @@ use crate::answer::{Answer, Prefer};
 use crate::clock_map::ClockMapQuality;
 use crate::curve::FocusCurve;
 use crate::event::Window;
+use crate::flags::Flag;
 use crate::quality::SweepQuality;
 use crate::search::{Estimate, MOST_WINDOWS, Method, SearchError, StructureAnswer};
 use crate::units::{CameraMicros, EventRate, HostMicros, LensPosition, LensRange, LensSpeed};
@@ -108,10 +109,13 @@ impl Phase {
 }
 
 /// What a disagreement of the two directions looks like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Suspicion {
     /// The way back lags behind its reported positions: play between motor and glass.
-    Backlash,
+    Backlash {
+        /// About how much, lens counts.
+        counts: f64,
+    },
     /// Positions are reported later than the lens was there.
     LatePositions,
     /// The two sweeps saw different peaks: the scene changed, or it has no single one.
@@ -122,7 +126,7 @@ impl Suspicion {
     /// Its name in reports.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Backlash => "backlash",
+            Self::Backlash { .. } => "backlash",
             Self::LatePositions => "late-positions",
             Self::DifferentPeaks => "different-peaks",
         }
@@ -252,6 +256,17 @@ impl Failure {
         }
     }
 
+    /// What a sweep that failed so casts on the answer of another one; nothing if that one is in question as well.
+    pub fn doubt(&self) -> Option<Flag> {
+        if matches!(self, Self::Weak { .. }) {
+            Some(Flag::Weak)
+        } else if matches!(self, Self::Unsure { .. } | Self::NoAnswer(_)) {
+            Some(Flag::Unsure)
+        } else {
+            None
+        }
+    }
+
     /// Whether the lens itself is at fault, so that it must not be told to move again.
     pub fn is_of_lens(&self) -> bool {
         matches!(
@@ -296,11 +311,14 @@ impl fmt::Display for Failure {
             }
             Self::DirectionMismatch { forward, backward, suspicion } => {
                 write!(f, "the way there says {forward}, the way back {backward}, more than the pixels' delay explains: ")?;
-                f.write_str(match suspicion {
-                    Suspicion::Backlash => "the lens has play; sweep one way only (speed fast)",
-                    Suspicion::LatePositions => "positions are reported too late; set the lens's latency",
-                    Suspicion::DifferentPeaks => "the scene changed between the two; try again",
-                })
+                match suspicion {
+                    Suspicion::Backlash { counts } => write!(
+                        f,
+                        "the lens has play; set lens.backlash_counts to about {counts:.0}, or sweep one way only (speed fast)"
+                    ),
+                    Suspicion::LatePositions => f.write_str("positions are reported too late; poll the lens faster"),
+                    Suspicion::DifferentPeaks => f.write_str("the scene changed between the two; try again"),
+                }
             }
             Self::NoAnswer(error) => write!(f, "the search has no answer: {error}"),
             Self::LensNotMoving => {

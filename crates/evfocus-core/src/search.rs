@@ -12,10 +12,11 @@ use core::time::Duration;
 
 use crate::counter::CounterError;
 use crate::event::Geometry;
-use crate::lens_trace::LensTraceError;
+use crate::event_store::EventStore;
+use crate::lens_trace::{LensTrace, LensTraceError};
 use crate::measure::PixelCounts;
 use crate::sweep::Sweep;
-use crate::units::LensPosition;
+use crate::units::{CameraMicros, LensPosition};
 
 pub use egs::{Comparison, GOLDEN_RATIO, MAX_ITERATIONS, STOP_INTERVAL_US, golden_search};
 pub use structure::{
@@ -186,6 +187,23 @@ impl Searcher {
         &mut self.structure
     }
 
+    /// Begins to take the events of a sweep along `travel` as they come.
+    pub(crate) fn begin(&mut self, travel: Travel) {
+        self.structure.begin(travel);
+        self.mirror_pairs.begin(travel);
+    }
+
+    /// Takes the events that it has not taken yet, up to the time `until`.
+    pub(crate) fn take(&mut self, store: &EventStore, trace: &LensTrace<CameraMicros>, until: CameraMicros) {
+        self.structure.take(store, trace, until);
+        self.mirror_pairs.take(store, trace, until);
+    }
+
+    /// What mirror pairs say of the sweep that was begun.
+    pub(crate) fn mirror_pairs(&mut self, sweep: &Sweep<'_>) -> Result<Estimate, SearchError> {
+        self.mirror_pairs.answer(sweep)
+    }
+
     /// Looks for the sharpest moment of `sweep`. `interval` is the accumulation interval of [`Method::ErFixed`] (the paper
     /// uses 55 and 65 ms); the other methods find their own. Allocates nothing.
     ///
@@ -207,9 +225,12 @@ impl Searcher {
             Method::ErFixed => er_fixed::search(sweep, interval),
             Method::Structure | Method::Auto => {
                 self.structure.begin(Travel::of(sweep)?);
-                Ok(self.structure.answer(sweep)?.estimate())
+                Ok(self.structure.answer(sweep)?.significant()?.estimate())
             }
-            Method::MirrorPairs => self.mirror_pairs.search(sweep),
+            Method::MirrorPairs => {
+                self.mirror_pairs.begin(Travel::of(sweep)?);
+                self.mirror_pairs.answer(sweep)
+            }
         }
     }
 }

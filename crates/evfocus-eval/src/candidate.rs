@@ -17,6 +17,8 @@ pub enum Candidate {
     FixedInterval(u64),
     /// A search of the core.
     Search(Method),
+    /// `auto` of a rig whose delay earlier runs have taught.
+    Taught,
 }
 
 /// The accumulation intervals of the paper's Algorithm 1, milliseconds.
@@ -33,7 +35,7 @@ impl Candidate {
     pub fn searches() -> Vec<Self> {
         let fixed = INTERVALS_MS.map(Self::FixedInterval);
         let others = Method::ALL.into_iter().filter(|method| *method != Method::ErFixed).map(Self::Search);
-        fixed.into_iter().chain(others).collect()
+        fixed.into_iter().chain(others).chain([Self::Taught]).collect()
     }
 
     /// Its name in the paper's tables, if it is in one.
@@ -43,7 +45,7 @@ impl Candidate {
             Self::FixedInterval(55) => Some("ER dt=0.055"),
             Self::FixedInterval(65) => Some("ER dt=0.065"),
             Self::Search(Method::Egs) => Some("ER + EGS"),
-            Self::FixedInterval(_) | Self::Search(_) => None,
+            Self::FixedInterval(_) | Self::Search(_) | Self::Taught => None,
         }
     }
 }
@@ -55,6 +57,7 @@ impl fmt::Display for Candidate {
             Self::OnFrames(operator) => write!(f, "{operator} (frames)"),
             Self::FixedInterval(milliseconds) => write!(f, "er-fixed {milliseconds} ms"),
             Self::Search(method) => f.write_str(method.name()),
+            Self::Taught => f.write_str("auto, delay learnt"),
         }
     }
 }

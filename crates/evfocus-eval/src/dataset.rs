@@ -44,6 +44,19 @@ impl Condition {
         }
     }
 
+    /// How it was lit.
+    pub(crate) fn light(self) -> hil_sim::Light {
+        match self {
+            Self::LightStatic | Self::LightDynamic => hil_sim::Light::Light,
+            Self::DarkStatic | Self::DarkDynamic => hil_sim::Light::Dark,
+        }
+    }
+
+    /// Whether the camera was shaken.
+    pub(crate) fn is_shaken(self) -> bool {
+        matches!(self, Self::LightDynamic | Self::DarkDynamic)
+    }
+
     /// What `name` says of itself in the words of the public data sets (`dark_shake`, `bright_static`, `dynamic`); nothing if a word is
     /// missing.
     pub fn of_name(name: &str) -> Option<Self> {
@@ -214,4 +227,13 @@ pub struct Dataset {
     pub about: String,
     /// The sequences.
     pub entries: Vec<Entry>,
+    /// Sweeps both ways of the same rig before other scenes, which teach it the pixels' delay; none, and there is nothing learnt.
+    pub teachers: Vec<Entry>,
+}
+
+impl Dataset {
+    /// Sequences that nothing was taught about.
+    fn untaught(name: &str, about: String, entries: Vec<Entry>) -> Self {
+        Self { name: name.to_owned(), about, entries, teachers: Vec::new() }
+    }
 }

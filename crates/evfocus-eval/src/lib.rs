@@ -3,7 +3,7 @@
 //! - [`operators`] are the eleven focus operators on pictures that the paper compares with; [`GreyImage`] is what they look at.
 //! - [`reconstruct`] makes pictures from events, [`frames`] makes the frames of a simulated camera.
 //! - [`dataset`] has the sequences: simulated ones and those of others; [`simulated_sweep`] makes one.
-//! - [`evaluate()`] asks every [`Candidate`] about every sequence; [`tables`] show what came of it.
+//! - [`evaluate()`] asks every [`Candidate`] about every sequence; [`tables`] and [`figures`] show what came of it.
 //!
 //! Not its job: focusing. Nothing that runs on a rig depends on this crate.
 
@@ -11,6 +11,7 @@ pub mod cache;
 mod candidate;
 pub mod dataset;
 mod evaluate;
+pub mod figures;
 pub mod frames;
 mod grey_image;
 pub mod operators;

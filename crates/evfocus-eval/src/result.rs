@@ -12,6 +12,9 @@ pub struct Answer {
     pub method: String,
     /// The mean of the answers for each way of the lens, in the unit of the sequence.
     pub position: Option<f64>,
+    /// Where another good part of the picture is sharp, if it is.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub second_depth: Option<f64>,
     /// The answer less the truth; the nearest one, if there are several.
     pub error: Option<f64>,
     /// One standard deviation of the position, as the method itself estimates it.
@@ -39,14 +42,28 @@ impl Answer {
             position.into_iter().flat_map(|position| truths.iter().map(move |truth| position - truth));
         let error = errors.min_by(|a, b| a.abs().total_cmp(&b.abs()));
         let method = candidate.to_string();
-        Self { method, position, error, error_bar: None, confidence: None, flags: Vec::new(), why }
+        Self {
+            method,
+            position,
+            second_depth: None,
+            error,
+            error_bar: None,
+            confidence: None,
+            flags: Vec::new(),
+            why,
+        }
     }
 }
+
+/// The curve of the event rate goes by this name.
+pub(crate) const EVENT_RATE: &str = "event rate";
+/// That of the energy of fine structure by this one.
+pub(crate) const STRUCTURE: &str = "structure";
 
 /// A focus curve.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Curve {
-    /// The candidate's name; `event rate` for the rate itself.
+    /// The candidate's name; `event rate` for the rate itself, `structure` for the energy of fine structure.
     pub method: String,
     /// Position, and value in the measure's own unit.
     pub points: Vec<(f64, f64)>,

@@ -1,6 +1,7 @@
 //! Errors in the layout of the paper's Tables 1 and 2, by stress, and how far the error bars can be trusted; as Markdown.
 
 mod reliability;
+mod summary;
 
 use evfocus_core::Method;
 
@@ -37,6 +38,7 @@ pub fn markdown(dataset: &Dataset, results: &[SequenceResult]) -> String {
         paper_table(&mut text, '1', "pictures made from events", &plain, on_events);
         paper_table(&mut text, '2', "frames", &plain, on_frames);
     }
+    summary::table(&mut text, results);
     stress_table(&mut text, results);
     reliability::table(&mut text, results);
     text

@@ -95,7 +95,7 @@ pub struct WindowAnswer {
 /// What the counts of a sweep look like.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Quality {
-    /// Share of the 5 ms windows whose rate is near the greatest, 0 to 1; above 0.3 the read-out or the link is the limit.
+    /// Share of the 5 ms windows whose rate is near the greatest, 0 to 1; above 0.3 without scatter the read-out or the link is the limit.
     pub share_at_ceiling: f64,
     /// Variance over mean of the counts in 0.2 ms bins of the busiest half: 1 for chance, below 0.1 a read-out limit.
     pub regularity: f64,

@@ -77,11 +77,19 @@ pub struct LensSection {
     pub max_counts: Option<f64>,
     /// How often the lens is asked where it is, milliseconds; 0.5 to 1000.
     pub poll_ms: f64,
+    /// Play between what the lens reports and the glass, counts; 0 to 1e6.
+    pub backlash_counts: f64,
 }
 
 impl Default for LensSection {
     fn default() -> Self {
-        Self { backend: "simulated".to_owned(), min_counts: None, max_counts: None, poll_ms: 2.0 }
+        Self {
+            backend: "simulated".to_owned(),
+            min_counts: None,
+            max_counts: None,
+            poll_ms: 2.0,
+            backlash_counts: 0.0,
+        }
     }
 }
 
@@ -98,6 +106,8 @@ pub struct Config {
     pub mode: Mode,
     /// How often the lens is asked where it is.
     pub lens_poll: Duration,
+    /// Play between what the lens reports and the glass, counts.
+    pub lens_backlash: f64,
     /// The positions the lens may be sent to, where they are narrower than its own.
     pub lens_min: Option<LensPosition>,
     /// See [`lens_min`](Self::lens_min).
@@ -220,6 +230,7 @@ impl Config {
             reports_kept: file.daemon.reports_kept as usize,
             mode,
             lens_poll: BadValue::duration("lens.poll_ms", file.lens.poll_ms, 1e-3, 0.5, 1000.0)?,
+            lens_backlash: BadValue::check("lens.backlash_counts", file.lens.backlash_counts, 0.0, 1e6)?,
             lens_min: min.map(LensPosition),
             lens_max: max.map(LensPosition),
             rig: file.simulation.rig()?,
@@ -243,6 +254,11 @@ impl Config {
         let mut controller = self.focus.controller(lens, self.lens_min, self.lens_max)?;
         // Room for a position at every poll of the longest sweep, and for the rests around it.
         let polls = controller.capacity.longest.as_secs_f64() / self.lens_poll.as_secs_f64();
+        controller.backlash = self.lens_backlash;
+        if self.focus.approach_margin_counts.is_none() {
+            // The last approach must take the play up.
+            controller.approach_margin = controller.approach_margin.max(2.0 * self.lens_backlash);
+        }
         controller.lens_samples = polls as usize * 2 + 1_000;
         Ok(controller)
     }

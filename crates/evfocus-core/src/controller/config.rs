@@ -40,6 +40,9 @@ pub struct ControllerConfig {
     pub nearest_is_high: bool,
     /// An answer this near to the truth is as good as the truth, counts; 1 % of the range swept if that is more.
     pub depth_of_focus: f64,
+    /// Known play between what the lens reports and the glass, counts: upwards the glass is where the lens says, downwards so much
+    /// above.
+    pub backlash: f64,
     /// How late the pixels are, as far as is known beforehand.
     pub delays: DelayModel,
     /// By what part of its length the range is extended at an end where focus seems to lie beyond; 0 for not at all.
@@ -90,6 +93,7 @@ impl ControllerConfig {
             prefer: Prefer::Strongest,
             nearest_is_high: true,
             depth_of_focus: 0.0,
+            backlash: 0.0,
             delays: DelayModel::default(),
             extension: 0.25,
             needs_homing: false,
@@ -118,6 +122,7 @@ impl ControllerConfig {
             edge_share: self.edge_share,
             largest_mismatch_share: self.largest_mismatch_share,
             delays,
+            backlash: self.backlash,
             prefer,
             nearest_is_high: self.nearest_is_high,
             ..rules

@@ -98,17 +98,6 @@ impl Run {
     }
 }
 
-/// What a sweep without an answer casts on the answer of the other one; nothing if that one is in question as well.
-fn doubt(failure: Failure) -> Option<Flag> {
-    if matches!(failure, Failure::Weak { .. }) {
-        Some(Flag::Weak)
-    } else if matches!(failure, Failure::Unsure { .. } | Failure::NoAnswer(_)) {
-        Some(Flag::Unsure)
-    } else {
-        None
-    }
-}
-
 impl Controller {
     /// Every change of state goes through here, so that the time of each phase is kept.
     pub(super) fn enter(&mut self, state: State, now: HostMicros) {
@@ -178,10 +167,19 @@ impl Controller {
         if let Some(place) = run.legs.get_mut(leg) {
             *place = Some(report);
         }
-        // A way back that says nothing leaves the answer of the way there.
-        let is_dispensable = leg == 1 && verdict.is_err_and(|failure| doubt(failure).is_some());
+        // What one way does not say, the other may.
+        let knows_its_error = matches!(run.plan.method, Method::Structure | Method::Auto);
+        let verdict = match verdict {
+            Err(failure)
+                if knows_its_error
+                    && run.plan.directions == Directions::Both
+                    && failure.doubt().is_some() =>
+            {
+                Ok(())
+            }
+            other => other,
+        };
         match (verdict, leg, run.plan.directions) {
-            (Err(_), _, _) if is_dispensable => self.decide(now, actions),
             (Err(failure), _, _) => self.fail(failure, now, actions),
             (Ok(()), 0, Directions::Both) => self.turn_round(now, actions),
             (Ok(()), _, _) => self.decide(now, actions),
@@ -224,18 +222,12 @@ impl Controller {
         }
     }
 
-    /// What the sweeps made say; what the first one says alone, with a flag, if the second one says nothing.
+    /// What the sweeps made say.
     fn judge(&self) -> Result<Answer, Failure> {
         let no_sweep = Failure::TooFewEvents { events: 0, needed: self.config.sweep_limits.fewest_events };
         let Some(Run { plan, legs: [Some(first), second], .. }) = &self.run else { return Err(no_sweep) };
         let rules = self.config.rules(plan.range, plan.prefer, self.delays);
-        let both = answer(first, second.as_ref(), plan.method, &rules);
-        let knows_its_error = matches!(plan.method, Method::Structure | Method::Auto);
-        let doubt = both.err().filter(|_| knows_its_error && second.is_some()).and_then(doubt);
-        let Some(flag) = doubt else { return both };
-        let mut first = answer(first, None, plan.method, &rules)?;
-        first.flags.set(flag, true);
-        Ok(first)
+        answer(first, second.as_ref(), plan.method, &rules)
     }
 
     /// Begins anew over a range that goes further at the end where `position` is; `false` if the lens cannot.

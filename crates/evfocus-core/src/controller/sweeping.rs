@@ -70,14 +70,17 @@ impl SweepState {
 
     pub(super) fn begin_rest(&mut self) {
         self.hot_pixels.restart();
+        self.analyzer.begin_rest();
     }
 
     pub(super) fn observe_rest(&mut self, events: &[Event]) {
         self.hot_pixels.observe(events);
+        self.analyzer.observe_rest(events);
     }
 
     pub(super) fn end_rest(&mut self, duration: Duration) {
         self.hot_pixels.learn(duration);
+        self.analyzer.end_rest();
     }
 
     pub(super) fn hot_pixels(&self) -> usize {

@@ -11,7 +11,10 @@ use alloc::vec::Vec;
 use super::structure::{Bookings, LensCursor, Travel, TravelStep};
 use super::{Estimate, SearchError, all_events_kept};
 use crate::event::{Event, Geometry};
+use crate::event_store::EventStore;
+use crate::lens_trace::LensTrace;
 use crate::sweep::Sweep;
+use crate::units::CameraMicros;
 
 /// Levels on either side of the first brightness that are remembered.
 const LEVELS: i8 = 6;
@@ -44,7 +47,9 @@ impl Pixel {
     /// Takes an event; the two places of the lens of the pair that it closes, if it does.
     fn take(&mut self, is_on: bool, step: TravelStep) -> Option<(u16, u16)> {
         self.level = self.level.saturating_add(if is_on { 1 } else { -1 });
-        let place = usize::try_from(self.level + LEVELS).ok().filter(|&place| place < LEVELS_IN_ALL)?;
+        let place = usize::try_from(i16::from(self.level) + i16::from(LEVELS))
+            .ok()
+            .filter(|&place| place < LEVELS_IN_ALL)?;
         let (mine, other) =
             if is_on { (&mut self.by_on, &mut self.by_off) } else { (&mut self.by_off, &mut self.by_on) };
         let (reached, partner) = (mine.get_mut(place)?, other.get_mut(place)?);
@@ -62,6 +67,8 @@ pub(super) struct MirrorPairs {
     /// Votes by distance, then by place.
     votes: Vec<f64>,
     sum: Vec<f64>,
+    /// The way of the sweep, where the lens is on it, and the next event of the store to look at.
+    progress: Option<(Travel, LensCursor, usize)>,
 }
 
 impl MirrorPairs {
@@ -71,25 +78,42 @@ impl MirrorPairs {
             pixels: vec![Pixel::UNTOUCHED; geometry.pixels()],
             votes: vec![0.0; DISTANCES * Bookings::BINS],
             sum: vec![0.0; Bookings::BINS],
+            progress: None,
         }
     }
 
-    pub(super) fn search(&mut self, sweep: &Sweep<'_>) -> Result<Estimate, SearchError> {
-        all_events_kept(sweep)?;
-        let travel = Travel::of(sweep)?;
+    /// Begins a sweep over the way of `travel`, whose events an emptied store will hold.
+    pub(super) fn begin(&mut self, travel: Travel) {
         self.pixels.fill(Pixel::UNTOUCHED);
         self.votes.fill(0.0);
-        let mut lens = LensCursor::new(travel);
-        for event in sweep.store.iter() {
-            let step = lens.at(event.t, sweep.trace);
-            self.take(&event, step);
+        self.progress = Some((travel, LensCursor::new(travel), 0));
+    }
+
+    /// Takes the events of `store` that it has not taken yet, up to the time `until`, for which `trace` tells the lens positions.
+    pub(super) fn take(&mut self, store: &EventStore, trace: &LensTrace<CameraMicros>, until: CameraMicros) {
+        let Some((travel, mut lens, mut next)) = self.progress else { return };
+        for event in store.iter().skip(next).take_while(|event| event.t <= until) {
+            let step = lens.at(event.t, trace);
+            self.vote(&event, step);
+            next += 1;
         }
+        self.progress = Some((travel, lens, next));
+    }
+
+    /// What the sweep that was begun says.
+    ///
+    /// # Errors
+    /// [`SearchError::EventsNotKept`], [`SearchError::NoPairs`].
+    pub(super) fn answer(&mut self, sweep: &Sweep<'_>) -> Result<Estimate, SearchError> {
+        all_events_kept(sweep)?;
+        self.take(sweep.store, sweep.trace, sweep.end);
+        let (travel, ..) = self.progress.ok_or(SearchError::NoPairs)?;
         let mode = self.mode().ok_or(SearchError::NoPairs)?;
         let at = self.at_distance_zero(mode);
         Ok(travel.estimate(sweep, at, 2.0 * NEAR, 1))
     }
 
-    fn take(&mut self, event: &Event, step: TravelStep) {
+    fn vote(&mut self, event: &Event, step: TravelStep) {
         let place = usize::from(event.y) * usize::from(self.geometry.width) + usize::from(event.x);
         let pixel = self.pixels.get_mut(place).filter(|_| self.geometry.contains(event.x, event.y));
         let Some((one, other)) = pixel.and_then(|pixel| pixel.take(event.polarity.is_on(), step)) else {
@@ -180,4 +204,20 @@ fn middle_near(votes: &[f64], mode: f64) -> Option<(f64, f64)> {
         moment += excess * (bin as f64 + 0.5);
     }
     (weight > 5.0).then(|| (moment / weight, weight))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_broken_pixel_leaves_the_levels_and_comes_back() {
+        let mut pixel = Pixel::UNTOUCHED;
+        let step = TravelStep(10);
+        let closed = |pixel: &mut Pixel, is_on| (0..1000).filter(|_| pixel.take(is_on, step).is_some()).count();
+        assert_eq!(closed(&mut pixel, true), 0);
+        // The levels that it passed on its way up, and none of those beyond.
+        assert_eq!(closed(&mut pixel, false), usize::try_from(LEVELS).unwrap());
+        assert_eq!(closed(&mut pixel, true), LEVELS_IN_ALL);
+    }
 }

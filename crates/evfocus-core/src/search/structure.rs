@@ -18,7 +18,7 @@ mod travel;
 use alloc::vec::Vec;
 
 use super::{Estimate, SearchError, all_events_kept};
-use crate::event::{Geometry, Window};
+use crate::event::{Event, Geometry, Window};
 use crate::event_store::EventStore;
 use crate::lens_trace::LensTrace;
 use crate::sweep::Sweep;
@@ -34,7 +34,7 @@ pub use travel::Travel;
 
 pub(super) use travel::LensCursor;
 
-use reading::Found;
+use reading::{CONSISTENT, FAINTEST, Found, LEAST_IF_CONSISTENT};
 
 /// Most windows of a request.
 pub const MOST_WINDOWS: usize = 8;
@@ -87,6 +87,19 @@ pub struct StructureAnswer {
 }
 
 impl StructureAnswer {
+    /// Itself, if chance does not make such a peak: it is high, or fairly high and much the same however it is read.
+    ///
+    /// # Errors
+    /// [`SearchError::Weak`].
+    pub fn significant(self) -> Result<Self, SearchError> {
+        let Self { significance, scatter, width, .. } = self;
+        let is_consistent = significance >= LEAST_IF_CONSISTENT && scatter <= CONSISTENT * width;
+        if significance < LEAST_SIGNIFICANCE && !is_consistent {
+            return Err(SearchError::Weak { significance });
+        }
+        Ok(self)
+    }
+
     /// The same as every method's.
     pub fn estimate(&self) -> Estimate {
         let Self { position, t_us, passes, interval_us, .. } = *self;
@@ -96,6 +109,8 @@ impl StructureAnswer {
 
 /// A peak wider than this part of the sweep is no peak.
 const WIDEST: f64 = 0.4;
+/// An apex nearer to the end of the sweep than this part of its width may be no peak.
+const END: f64 = 0.05;
 /// An apex nearer to an end than this part of its width is cut off.
 const EDGE: f64 = 0.5;
 
@@ -118,6 +133,18 @@ impl StructureSearch {
         }
     }
 
+    pub(crate) fn begin_rest(&mut self) {
+        self.measures().for_each(StructureMeasure::begin_rest);
+    }
+
+    pub(crate) fn observe_rest(&mut self, events: &[Event]) {
+        self.measures().for_each(|measure| measure.observe_rest(events));
+    }
+
+    pub(crate) fn end_rest(&mut self) {
+        self.measures().for_each(StructureMeasure::end_rest);
+    }
+
     pub(crate) fn begin(&mut self, travel: Travel) {
         self.measures().for_each(|measure| measure.begin(travel));
     }
@@ -135,7 +162,7 @@ impl StructureSearch {
         self.whole.has_passed_peak() && self.windows.iter_mut().all(StructureMeasure::has_passed_peak)
     }
 
-    /// The answer of the whole picture.
+    /// The answer of the whole picture, which may be too weak to be believed alone.
     pub(crate) fn answer(&mut self, sweep: &Sweep<'_>) -> Result<StructureAnswer, SearchError> {
         answer(&mut self.whole, sweep)
     }
@@ -156,10 +183,19 @@ fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<Structure
     let nothing = SearchError::Weak { significance: 0.0 };
     let travel = measure.travel().ok_or(nothing)?;
     let first = measure.read(Reading::FIRST).ok_or(nothing)?;
-    // Near the start the picture at the start is the wrong one to compare with.
-    let (reference, passes) = if first.at < first.width { (1.0, 2) } else { (0.0, 1) };
+    // Near the start the picture at the start is the wrong one to compare with. And where not much texture is blurred away by far,
+    // what is most unlike the start is the other end.
+    let is_at_end = measure.bins_covered() as f64 - first.at < END * first.width;
+    let (mut reference, passes) = if first.at < first.width || is_at_end { (1.0, 2) } else { (0.0, 1) };
     if passes == 2 {
         measure.take_again(sweep.store, sweep.trace);
+    }
+    if is_at_end && first.at >= first.width {
+        let other = measure.read(Reading { reference: 1.0, ..Reading::FIRST }).ok_or(nothing)?;
+        // Compared with the end, what is truly sharp at the end is most unlike the start.
+        if other.at < EDGE * other.width {
+            reference = 0.0;
+        }
     }
     let mut found = measure.read_all(Filter::Fine, reference).ok_or(nothing)?;
     if !found.is_sound()
@@ -168,7 +204,7 @@ fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<Structure
     {
         found = coarse;
     }
-    if found.apex.significance < LEAST_SIGNIFICANCE {
+    if found.apex.significance < FAINTEST {
         return Err(SearchError::Weak { significance: found.apex.significance });
     }
     Ok(in_counts(measure, &found, passes, travel, sweep))

@@ -41,7 +41,7 @@ pub fn dataset(folder: &Path) -> anyhow::Result<Dataset> {
             source: Source::Ead(path, truth),
         });
     }
-    Ok(Dataset { name: String::from("EAD"), about: String::from("the paper's data set, EAD"), entries })
+    Ok(Dataset::untaught("EAD", String::from("the paper's data set, EAD"), entries))
 }
 
 fn find_mat_files(folder: &Path, found: &mut Vec<PathBuf>) -> anyhow::Result<()> {

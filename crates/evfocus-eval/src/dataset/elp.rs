@@ -50,7 +50,7 @@ pub fn dataset(folder: &Path) -> anyhow::Result<Dataset> {
         }
     });
     let about = String::from("the data set of the event-based Laplacian product, ELP; errors are times");
-    Ok(Dataset { name: String::from("ELP"), about, entries: entries.collect() })
+    Ok(Dataset::untaught("ELP", about, entries.collect()))
 }
 
 fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> anyhow::Result<()> {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use evfocus_core::{Event, HostMicros, LensPosition, LensSpeed};
 use evfocus_record::Evt3Writer;
-use hil_sim::{CameraModel, Light, MotionConfig, Rig, RigConfig, Scene};
+use hil_sim::{CameraModel, Light, MotionConfig, Rig, RigConfig, Scene, SensorConfig};
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -51,13 +51,7 @@ pub struct Recipe {
 impl Recipe {
     /// The paper's sweep before `scene`: the whole range in 2 s, between rests of 60 ms.
     pub fn new(scene: Scene, condition: Condition, focus: f64, seed: u64) -> Self {
-        let (is_dark, is_shaken) = match condition {
-            Condition::LightStatic => (false, false),
-            Condition::LightDynamic => (false, true),
-            Condition::DarkStatic => (true, false),
-            Condition::DarkDynamic => (true, true),
-        };
-        let light = if is_dark { Light::Dark } else { Light::Light };
+        let light = condition.light();
         let mut draw = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut rig = RigConfig::preset(CameraModel::Davis346, light);
         rig.scene = scene;
@@ -65,12 +59,17 @@ impl Recipe {
         rig.seed = seed;
         rig.optics.blur_px_per_count = draw.random_range(0.015..0.03);
         let shake = draw.random_range(1.5..3.0);
-        if is_shaken {
+        if condition.is_shaken() {
             rig.motion = shaken_by(shake);
         }
         let speed = rig.lens.max_speed;
         let sweep = SweepPlan { rig, speed, ways: Ways::Up, rest: Duration::from_millis(60) };
         Self { sweep, frames: FrameConfig::davis346(light) }
+    }
+
+    fn entry(self, name: String, condition: Condition) -> Entry {
+        let label = Label { name, condition: Some(condition), stress: None, unit: Unit::Counts };
+        Entry { label, source: Source::Simulated(Box::new(self)) }
     }
 
     /// What the result follows from, in words.
@@ -126,8 +125,28 @@ impl SweepObserver for Observer {
     }
 }
 
+/// Changes a sensor for the light given.
+type Sensor = fn(Light, usize) -> SensorConfig;
+
 /// The 28 sequences.
 pub fn dataset() -> Dataset {
+    let about = String::from(
+        "simulated, shaped like the paper's data set: 7 scenes, light and dark, static and dynamic",
+    );
+    shaped_like_the_papers("simulated", about, |light, _| SensorConfig::preset(CameraModel::Davis346, light))
+}
+
+/// The same with the pixel models of other simulators, of which each has every other sequence: what fits our pixels alone shows.
+pub fn foreign() -> Dataset {
+    let about = String::from(
+        "the same scenes before pixels that work like those of v2e and IEBCS, two public simulators, in turns",
+    );
+    shaped_like_the_papers("foreign", about, |light, index| {
+        if index % 2 == 0 { SensorConfig::v2e_like(light) } else { SensorConfig::iebcs_like(light) }
+    })
+}
+
+fn shaped_like_the_papers(name: &str, about: String, sensor: Sensor) -> Dataset {
     let range = RigConfig::default().lens.range;
     let number = SCENES.len() * Condition::ALL.len();
     let mut entries = Vec::with_capacity(number);
@@ -137,14 +156,30 @@ pub fn dataset() -> Dataset {
             let place = (11 * (scene_index * Condition::ALL.len() + index)) % number;
             let share = MARGIN + (1.0 - 2.0 * MARGIN) * (place as f64 + 0.5) / number as f64;
             let focus = range.min().0 + share * range.length();
-            let recipe = Recipe::new(scene, condition, focus, SEED + 100 * picture + index as u64);
-            let name = format!("{scene_name}_{}", condition.title().replace(' ', "_"));
-            let label = Label { name, condition: Some(condition), stress: None, unit: Unit::Counts };
-            entries.push(Entry { label, source: Source::Simulated(Box::new(recipe)) });
+            let mut recipe = Recipe::new(scene, condition, focus, SEED + 100 * picture + index as u64);
+            recipe.sweep.rig.sensor = sensor(condition.light(), scene_index);
+            entries.push(
+                recipe.entry(format!("{scene_name}_{}", condition.title().replace(' ', "_")), condition),
+            );
         }
     }
-    let about = String::from(
-        "simulated, shaped like the paper's data set: 7 scenes, light and dark, static and dynamic",
-    );
-    Dataset { name: String::from("simulated"), about, entries }
+    // A rig has one kind of pixels: where they change from sequence to sequence nothing can be learnt.
+    let is_one_rig = sensor(Light::Light, 0) == sensor(Light::Light, 1);
+    let teachers = if is_one_rig { teachers(sensor) } else { Vec::new() };
+    Dataset { teachers, ..Dataset::untaught(name, about, entries) }
+}
+
+/// Sweeps both ways before scenes that are not among those judged.
+fn teachers(sensor: Sensor) -> Vec<Entry> {
+    let mut teachers = Vec::new();
+    for (index, scene) in [Scene::Foliage, Scene::Buildings].into_iter().enumerate() {
+        for condition in Condition::ALL {
+            let seed = SEED + 5_000 + 10 * index as u64 + condition as u64;
+            let mut recipe = Recipe::new(scene, condition, 1800.0, seed);
+            recipe.sweep.rig.sensor = sensor(condition.light(), 0);
+            recipe.sweep.ways = Ways::UpAndDown;
+            teachers.push(recipe.entry(format!("teacher_{scene}_{}", condition.title()), condition));
+        }
+    }
+    teachers
 }

@@ -96,5 +96,5 @@ pub fn stress_suite() -> Dataset {
     }
     let about =
         String::from("simulated, with one thing wrong or more difficult at a time; each in four conditions");
-    Dataset { name: String::from("stress"), about, entries }
+    Dataset::untaught("stress", about, entries)
 }

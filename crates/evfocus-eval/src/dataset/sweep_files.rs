@@ -75,7 +75,7 @@ pub fn dataset(folder: &Path) -> anyhow::Result<Dataset> {
         );
     }
     let about = format!("recorded sweeps in {}", folder.display());
-    Ok(Dataset { name: String::from("sweeps"), about, entries })
+    Ok(Dataset::untaught("sweeps", about, entries))
 }
 
 /// The names of the sweeps in `folder`, sorted.

@@ -4,36 +4,35 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::time::Duration;
 
-use evfocus_core::search::{Comparison, golden_search};
+use evfocus_core::search::{Comparison, Reading, StructureMeasure, Travel, golden_search};
 use evfocus_core::{
-    Analyzer, CameraMicros, Failure, Flag, Geometry, LegReport, LensPosition, LensRange, Method, Question,
-    Rules, Searcher, Sweep, SweepCapacity, SweepLimits, SweepRecorder, event_rate,
+    Analyzer, CameraMicros, DelayModel, Failure, Flag, Geometry, LegReport, LensPosition, LensRange, Method,
+    Question, Rules, Searcher, Sweep, SweepCapacity, SweepLimits, SweepRecorder, Window, event_rate,
 };
 
 use crate::dataset::{Label, Sequence, Way};
 use crate::frames::Frames;
-use crate::result::{Answer, Curve, SequenceResult};
+use crate::result::{Answer, Curve, EVENT_RATE, STRUCTURE, SequenceResult};
 use crate::{Candidate, GreyImage, Operator, reconstruct};
 
 /// The accumulation interval of the curve that is drawn of the event rate, microseconds.
 const CURVE_INTERVAL_US: f64 = 55_000.0;
 /// From one point of that curve to the next.
 const CURVE_STEP_US: f64 = 10_000.0;
-/// The curve of the event rate goes by this name.
-pub(crate) const EVENT_RATE: &str = "event rate";
-
 /// What `candidates` say of `sequence`: of its first two ways together, if the lens went both ways.
-pub(super) fn ask(label: &Label, sequence: &Sequence, candidates: &[Candidate]) -> SequenceResult {
-    let ways: Vec<Asked> = sequence
-        .ways()
-        .iter()
-        .take(2)
-        .map(|way| Asked::of(sequence.geometry, way, sequence.frames.as_ref()))
-        .collect();
+pub(super) fn ask(
+    label: &Label,
+    sequence: &Sequence,
+    candidates: &[Candidate],
+    delays: &DelayModel,
+) -> SequenceResult {
+    let ways = sequence.ways();
+    let ways = ways.iter().take(2).map(|way| Asked::of(sequence.geometry, way, sequence.frames.as_ref()));
+    let ways: Vec<Asked> = ways.collect();
     let mut answers = Vec::with_capacity(candidates.len());
     for &candidate in candidates {
         if !matches!(candidate, Candidate::OnFrames(_)) || sequence.frames.is_some() {
-            answers.push(say(candidate, &ways, sequence));
+            answers.push(say(candidate, &ways, sequence, delays));
         }
     }
     let nearest = |position: f64| {
@@ -56,10 +55,26 @@ fn range_of(sequence: &Sequence) -> Option<LensRange> {
     LensRange::new(low, high).ok()
 }
 
-fn say(candidate: Candidate, ways: &[Asked], sequence: &Sequence) -> Answer {
-    if let Candidate::Search(method) = candidate {
-        return match by_core(method, ways, sequence) {
+/// Learns what the pixels' delay was from a sweep both ways.
+pub(super) fn teach(sequence: &Sequence, delays: &mut DelayModel) {
+    let ways = sequence.ways();
+    let ways: Vec<Asked> = ways.iter().take(2).map(|way| Asked::searched(sequence.geometry, way)).collect();
+    let answer = by_core(Method::Auto, &ways, sequence, *delays);
+    if let Some((noise_hz, delay)) = answer.ok().and_then(|answer| answer.measured) {
+        delays.learn(noise_hz, delay.seconds, delay.uncertainty_s);
+    }
+}
+
+fn say(candidate: Candidate, ways: &[Asked], sequence: &Sequence, delays: &DelayModel) -> Answer {
+    let (method, delays) = match candidate {
+        Candidate::Search(method) => (Some(method), DelayModel::default()),
+        Candidate::Taught => (Some(Method::Auto), *delays),
+        Candidate::OnEvents(_) | Candidate::OnFrames(_) | Candidate::FixedInterval(_) => (None, *delays),
+    };
+    if let Some(method) = method {
+        return match by_core(method, ways, sequence, delays) {
             Ok(found) => Answer {
+                second_depth: found.second_depth.map(|second| second.0),
                 error_bar: found.error_bar,
                 confidence: found.confidence,
                 flags: found.flags.iter().map(|flag| Flag::name(flag).to_owned()).collect(),
@@ -78,11 +93,21 @@ fn say(candidate: Candidate, ways: &[Asked], sequence: &Sequence) -> Answer {
 
 /// The answer of the core by the rules of the daemon; what makes a sweep unfit is held against `auto` only, the others are to show what
 /// they say of it.
-fn by_core(method: Method, ways: &[Asked], sequence: &Sequence) -> Result<evfocus_core::Answer, String> {
-    let rules = Rules::for_range(range_of(sequence).ok_or("the lens did not move")?);
+fn by_core(
+    method: Method,
+    ways: &[Asked],
+    sequence: &Sequence,
+    delays: DelayModel,
+) -> Result<evfocus_core::Answer, String> {
+    let range = range_of(sequence).ok_or("the lens did not move")?;
+    let rules = Rules { delays, ..Rules::for_range(range) };
     if method == Method::Auto {
         for way in ways {
-            way.verdict.map_err(|failure| failure.to_string())?;
+            match way.verdict {
+                // What one way does not say, the other may.
+                Err(failure) if ways.len() > 1 && failure.doubt().is_some() => {}
+                verdict => verdict.map_err(|failure| failure.to_string())?,
+            }
         }
     }
     let reports: Vec<&LegReport> = ways.iter().filter_map(|way| way.report.as_ref()).collect();
@@ -120,6 +145,13 @@ impl Asked {
             }
             asked.take(on_frames, Candidate::OnFrames);
         }
+        asked.search(geometry, way);
+        asked
+    }
+
+    /// Without the operators on pictures.
+    fn searched(geometry: Geometry, way: &Way<'_>) -> Self {
+        let mut asked = Self::default();
         asked.search(geometry, way);
         asked
     }
@@ -162,6 +194,7 @@ impl Asked {
         }
         self.steps = search_steps(&sweep);
         self.curves.push(rate_curve(&sweep));
+        self.curves.extend(structure_curve(geometry, &sweep));
     }
 
     fn answer(&self, candidate: Candidate) -> Result<f64, String> {
@@ -211,4 +244,16 @@ fn rate_curve(sweep: &Sweep<'_>) -> Curve {
         from += CURVE_STEP_US;
     }
     Curve { method: String::from(EVENT_RATE), points }
+}
+
+fn structure_curve(geometry: Geometry, sweep: &Sweep<'_>) -> Option<Curve> {
+    let travel = Travel::of(sweep).ok()?;
+    let mut measure = StructureMeasure::new(Window::whole(geometry));
+    measure.begin(travel);
+    measure.take(sweep.store, sweep.trace, sweep.end);
+    measure.read(Reading::FIRST)?;
+    let points = measure.curve().iter().enumerate();
+    // Each point holds what happened up to the end of its bin.
+    let points = points.map(|(bin, &energy)| (travel.position_of(bin as f64 + 1.0).0, energy)).collect();
+    Some(Curve { method: String::from(STRUCTURE), points })
 }

@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use evfocus_eval::dataset::{Dataset, ead, elp, simulated, stress_suite, sweep_files};
 use evfocus_eval::result::SequenceResult;
-use evfocus_eval::{Cache, cache, evaluate, tables};
+use evfocus_eval::{Cache, cache, evaluate, figures, tables};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ use crate::output::Output;
 #[command(after_help = "\
 Examples:
   evfocus eval --suite simulated --markdown
-  evfocus eval --suite simulated --markdown > docs/results.md
+  evfocus eval --suite simulated --markdown --figures figures/ > results.md
   evfocus eval --sweeps recordings/ --json | jq '.[0].results[].answers'
 
 The simulated suite is shaped like the data set of \"Autofocus for Event Cameras\" (Lin et al., CVPR 2022): 7 scenes, light and \
@@ -28,7 +28,7 @@ command goes on where it was, and a new build of the program judges anew.
 
 Units: errors in lens counts; in milliseconds of the sweep for --elp, whose positions are not known.")]
 pub struct Arguments {
-    /// Simulated sequences: the paper's conditions, or one difficulty at a time. May be given twice
+    /// Simulated sequences: the paper's conditions, or one difficulty at a time; may be given several times
     #[arg(long = "suite", value_name = "NAME", value_enum)]
     suites: Vec<Suite>,
     /// A folder with sweeps: NAME.raw, NAME.positions.csv, NAME.truth.json
@@ -46,6 +46,9 @@ pub struct Arguments {
     /// Print every answer and curve as JSON instead
     #[arg(long, conflicts_with = "markdown")]
     json: bool,
+    /// Draw the errors, focus curves and the golden search's steps into this folder, as SVG
+    #[arg(long, value_name = "DIR")]
+    figures: Option<PathBuf>,
     /// Sequences judged at the same time; all cores if left out
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -62,6 +65,8 @@ pub struct Arguments {
 enum Suite {
     /// 28 sequences shaped like the paper's.
     Simulated,
+    /// The same before pixels of two other simulators' kinds.
+    Foreign,
     /// Sweeps with one thing wrong at a time.
     Stress,
 }
@@ -79,6 +84,7 @@ impl Arguments {
         for suite in &self.suites {
             datasets.push(match suite {
                 Suite::Simulated => simulated::dataset(),
+                Suite::Foreign => simulated::foreign(),
                 Suite::Stress => stress_suite(),
             });
         }
@@ -105,6 +111,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     for dataset in &datasets {
         judged.push((dataset, judge(dataset, &cache, threads)?));
     }
+    if let Some(folder) = &arguments.figures {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("{}: cannot make the folder", folder.display()))?;
+        for (dataset, results) in &judged {
+            figures::draw(&dataset.name, results, folder)?;
+        }
+    }
     let mut out = Output::new();
     if arguments.json {
         let judged: Vec<Judged> = judged
@@ -127,7 +140,7 @@ fn judge(dataset: &Dataset, cache: &Cache, threads: usize) -> anyhow::Result<Vec
     if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:30} {pos}/{len} {eta} {msg}") {
         bar.set_style(style);
     }
-    let results = evaluate(&dataset.entries, cache, threads, &|name| {
+    let results = evaluate(dataset, cache, threads, &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     });

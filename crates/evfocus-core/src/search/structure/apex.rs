@@ -31,6 +31,8 @@ pub struct Apex {
     pub height: f64,
     /// How high the peak is in units of what chance makes over its width.
     pub significance: f64,
+    /// How high the curve ends, as a part of the peak's height.
+    pub end_level: f64,
 }
 
 impl Apex {
@@ -87,7 +89,9 @@ impl ApexFinder {
         let (from, to) = self.stretch_above(highest, top);
         let vertex =
             curve.get(from..=to).and_then(vertex).map_or(highest.index as f64, |at| from as f64 + at);
-        Some(Apex { at: vertex + 1.0, width, height: peak.height, significance })
+        let end = self.smooth.last().map_or(0.0, |last| last - highest.base);
+        let end_level = if highest.height > 0.0 { end / highest.height } else { 1.0 };
+        Some(Apex { at: vertex + 1.0, width, height: peak.height, significance, end_level })
     }
 
     /// Smoothes the curve with a Gaussian of `sigma` bins; its ends are held.

@@ -8,7 +8,7 @@ use super::kernel::{StructureKernel, TravelStep};
 use super::noise::NoiseMeter;
 use super::reading::LEAST_SIGNIFICANCE;
 use super::travel::{LensCursor, Travel};
-use crate::event::Window;
+use crate::event::{Event, Window};
 use crate::event_store::EventStore;
 use crate::lens_trace::LensTrace;
 use crate::units::CameraMicros;
@@ -78,6 +78,21 @@ impl StructureMeasure {
         }
     }
 
+    /// Forgets the runs before: what comes next comes at rest.
+    pub fn begin_rest(&mut self) {
+        self.noise.forget();
+    }
+
+    /// Takes events made while the lens stands still before its sweep.
+    pub fn observe_rest(&mut self, events: &[Event]) {
+        events.iter().for_each(|event| self.noise.take(event));
+    }
+
+    /// The lens is about to begin its sweep.
+    pub fn end_rest(&mut self) {
+        self.noise.end_rest();
+    }
+
     /// Begins a sweep over the way of `travel`, whose events an emptied store will hold.
     pub fn begin(&mut self, travel: Travel) {
         self.kernel.begin();
@@ -99,6 +114,7 @@ impl StructureMeasure {
                 return;
             }
             let step = progress.cursor.at(event.t, trace);
+            self.noise.take(&event);
             if progress.phase == Phase::AtStart {
                 if step.0 < REST {
                     progress.taken.1 += 1;
@@ -110,7 +126,6 @@ impl StructureMeasure {
                 progress.phase = Phase::Arrived;
                 return;
             }
-            self.noise.take(&event);
             self.kernel.take(&event, step);
             progress.taken.1 += 1;
             progress.newest = step;
@@ -151,6 +166,11 @@ impl StructureMeasure {
         self.finder.find(&self.curve, top)
     }
 
+    /// The energy by bin of the lens's way, as last read; its unit is arbitrary.
+    pub fn curve(&self) -> &[f64] {
+        &self.curve
+    }
+
     /// The noise of the pixels, Hz.
     pub fn noise_hz(&self) -> f64 {
         self.noise.noise_hz()
@@ -173,6 +193,8 @@ impl StructureMeasure {
         let covered = self.bins_covered() as f64;
         let Some(apex) = self.read(Reading::FIRST) else { return false };
         let widths = if apex.at < apex.width { 2.0 } else { 1.0 };
-        apex.significance >= SURE_SIGNIFICANCE && covered - apex.at > widths * apex.width
+        // A curve that is high again may be on its way to a higher peak.
+        let is_down = apex.end_level < 0.5;
+        apex.significance >= SURE_SIGNIFICANCE && is_down && covered - apex.at > widths * apex.width
     }
 }

@@ -25,6 +25,8 @@ pub struct NoiseMeter {
     span_end: Option<i64>,
     /// How many tiles and spans had each count.
     seen: Vec<u32>,
+    /// The same while the lens stood still before the sweeps.
+    at_rest: Vec<u32>,
 }
 
 impl NoiseMeter {
@@ -32,14 +34,33 @@ impl NoiseMeter {
     pub fn new(window: Window) -> Self {
         let (columns, rows) = (window.width / TILE, window.height / TILE);
         let tiles = usize::from(columns) * usize::from(rows);
-        Self { columns, rows, window, counts: vec![0; tiles], span_end: None, seen: vec![0; COUNTS] }
+        Self {
+            columns,
+            rows,
+            window,
+            counts: vec![0; tiles],
+            span_end: None,
+            seen: vec![0; COUNTS],
+            at_rest: vec![0; COUNTS],
+        }
     }
 
     /// Forgets everything.
+    pub fn forget(&mut self) {
+        self.at_rest.fill(0);
+        self.begin();
+    }
+
+    /// Begins a sweep: what was taken before, if it was at rest, counts for this sweep and for those that follow.
     pub fn begin(&mut self) {
         self.counts.fill(0);
-        self.seen.fill(0);
+        self.seen.copy_from_slice(&self.at_rest);
         self.span_end = None;
+    }
+
+    /// What was taken since [`forget`](Self::forget) was taken at rest: nothing but noise, if the scene is still.
+    pub fn end_rest(&mut self) {
+        self.at_rest.copy_from_slice(&self.seen);
     }
 
     /// Takes an event; times must not decrease by more than jitter.

@@ -4,8 +4,15 @@ use super::apex::{Apex, TOP};
 use super::bookings::{Bookings, Filter, TileSet};
 use super::measure::{Reading, StructureMeasure};
 
-/// An answer whose significance (see [`Apex::significance`]) is lower is none. Sweeps with their pixels shuffled stay below it.
+/// An answer whose significance (see [`Apex::significance`]) is lower may not be believed for its height alone. Sweeps with their
+/// pixels shuffled stay below it, most of them below 6.
 pub const LEAST_SIGNIFICANCE: f64 = 15.0;
+/// It may be believed all the same down to here, if its readings agree with each other better than those of chance do.
+pub(super) const LEAST_IF_CONSISTENT: f64 = 10.0;
+/// How well that is: their scatter as a part of the peak's width.
+pub(super) const CONSISTENT: f64 = 0.06;
+/// An answer that is fainter is none, whoever says the same.
+pub(super) const FAINTEST: f64 = 8.0;
 /// A tile or another reading needs less, for it is not asked whether it may be believed alone.
 const LEAST_TILE_SIGNIFICANCE: f64 = 8.0;
 /// Scatter above this part of the peak's width: the readings contradict each other.

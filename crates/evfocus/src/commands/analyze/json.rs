@@ -88,6 +88,7 @@ struct Estimator {
 struct Quality {
     peak_rate: f64,
     share_at_ceiling: f64,
+    ceiling_dispersion: f64,
     regularity: f64,
     dispersion: f64,
     flicker_hz: u32,
@@ -173,6 +174,7 @@ impl Quality {
         Self {
             peak_rate,
             share_at_ceiling: quality.share_at_ceiling,
+            ceiling_dispersion: quality.ceiling_dispersion,
             regularity: quality.regularity,
             dispersion: quality.dispersion,
             flicker_hz: quality.flicker_hz,

@@ -1,0 +1,23 @@
+//! A few of the runs that `cargo run --release -p evfocus-tests --bin random-runs` makes by the thousand: none hangs, none is wrong and
+//! sure of it, none fails for a reason that misleads.
+
+use anyhow::Result;
+use evfocus_tests::random_runs::{Verdict, run_all};
+
+#[test]
+fn random_runs_end_in_focus_or_with_the_right_reason() -> Result<()> {
+    let seeds: Vec<u64> = (2000..2016).collect();
+    let runs = run_all(&seeds, 2, &|_| {})?;
+    for (seed, trial, ended) in &runs {
+        let verdict = ended.verdict(trial);
+        println!("seed {seed}: {}, {}, error {:?}", verdict.title(), ended.reason(), ended.error);
+        assert!(
+            !matches!(verdict, Verdict::Wrong | Verdict::Misled),
+            "seed {seed}: {verdict:?}, {}",
+            ended.reason()
+        );
+    }
+    let focused = runs.iter().filter(|(_, trial, ended)| ended.verdict(trial) == Verdict::Focused).count();
+    assert!(focused >= 6, "{focused} of 16 focused");
+    Ok(())
+}
