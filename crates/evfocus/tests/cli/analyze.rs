@@ -16,7 +16,7 @@ fn a_shaken_sweep_is_focused_near_the_truth() {
     assert_eq!((&analysis["method"], &analysis["decided_by"]), (&"auto".into(), &"structure".into()));
     let error = number(&analysis, "position") - number(&sweep().truth, "position");
     let error_bar = number(&analysis, "error_bar");
-    assert!(error.abs() < 3.0 * error_bar && error_bar < 30.0, "error {error:+.1} of {error_bar:.1}");
+    assert!(error.abs() < 3.0 * error_bar && error_bar < 40.0, "error {error:+.1} of {error_bar:.1}");
     assert!((0.5..=1.0).contains(&number(&analysis, "confidence")));
     assert!(analysis["flags"].is_array() && analysis["second_depth"].is_null());
     let (t_us, events) = (number(&analysis, "t_us"), number(&analysis, "events"));
@@ -61,7 +61,10 @@ fn the_mean_of_both_directions_cancels_the_delay() {
     assert_eq!((&sweeps[0]["direction"], &sweeps[1]["direction"]), (&"forward".into(), &"backward".into()));
     let answers: Vec<f64> = sweeps.iter().map(|sweep| number(sweep, "position")).collect();
     let mean = f64::midpoint(answers[0], answers[1]);
-    assert!((number(&analysis, "position") - mean).abs() < 1e-9);
+    // Each is weighted by how sure it is of itself, so that it lies between the two, near their mean.
+    let position = number(&analysis, "position");
+    assert!((answers[1]..answers[0]).contains(&position), "{position} is not between {answers:?}");
+    assert!((position - mean).abs() < number(&analysis, "error_bar"), "{position}, mean {mean}");
     let delay_us = (answers[0] - answers[1]) / 2.0 / number(&sweeps[0], "speed_counts_per_s") * 1e6;
     assert!((number(&analysis, "delay_us") - delay_us).abs() < 1e-6);
     let words = crate::program::stdout(&evfocus(&both.analyze()));
