@@ -18,7 +18,7 @@ use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 pub use config::{LensConfig, LensKind};
 pub(crate) use state::LensState;
-use trajectory::Command;
+pub(crate) use trajectory::Command;
 
 /// How long a caller waits for a lens that has fallen silent.
 const REPLY_TIMEOUT: std::time::Duration = std::time::Duration::from_millis(50);

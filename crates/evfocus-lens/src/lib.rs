@@ -1,0 +1,15 @@
+//! Drivers for motorised lenses. Each protocol has a folder: `protocol` is pure (bytes in, bytes out), the driver beside it
+//! speaks it over a [`Port`] and implements [`evfocus_hal::Lens`].
+//!
+//! Every driver bounds its waits and retries, stops the lens when it is dropped, and opens its port again at the next call
+//! after the connection was lost.
+//!
+//! Not their job: knowing each other, the daemon, or anything of focus.
+
+mod continuity;
+mod line;
+pub mod moonlite;
+mod port;
+
+pub use moonlite::MoonLite;
+pub use port::Port;

@@ -1,0 +1,57 @@
+//! The rig's lens, as the firmware of a controller gets at it.
+
+use std::sync::{Arc, Mutex};
+
+use evfocus_core::HostMicros;
+
+use crate::lens::{Command, LensState, lock};
+
+/// A handle to the rig's motor and its position read-out.
+#[derive(Debug, Clone)]
+pub(crate) struct Motor {
+    state: Arc<Mutex<LensState>>,
+    epoch: HostMicros,
+}
+
+impl Motor {
+    pub(crate) fn new(state: Arc<Mutex<LensState>>, epoch: HostMicros) -> Self {
+        Self { state, epoch }
+    }
+
+    fn seconds(&self, time: HostMicros) -> f64 {
+        time.micros_since(self.epoch) as f64 / 1e6
+    }
+
+    /// Sets out for `target`, or for the end of the way if that is nearer.
+    pub(super) fn travel(&self, now: HostMicros, target: f64, speed: f64) {
+        let mut state = lock(&self.state);
+        let range = state.config().range;
+        let fastest = state.config().max_speed.counts_per_second();
+        let target = target.clamp(range.min().0, range.max().0);
+        let command = Command::Travel { target, speed: speed.clamp(1e-3, fastest) };
+        state.command(self.seconds(now), command);
+    }
+
+    pub(super) fn brake(&self, now: HostMicros) {
+        lock(&self.state).command(self.seconds(now), Command::Brake);
+    }
+
+    /// What the position read-out says at `time`, counts, and whether the motor is driven.
+    pub(super) fn report(&self, time: HostMicros) -> (f64, bool) {
+        let seconds = self.seconds(time);
+        lock(&self.state).report(seconds)
+    }
+
+    /// Counts per second.
+    pub(super) fn max_speed(&self) -> f64 {
+        lock(&self.state).config().max_speed.counts_per_second()
+    }
+
+    pub(super) fn is_unplugged(&self, now: HostMicros) -> bool {
+        lock(&self.state).unplugged(self.seconds(now))
+    }
+
+    pub(super) fn is_silent(&self, now: HostMicros) -> bool {
+        lock(&self.state).silent(self.seconds(now))
+    }
+}
