@@ -129,6 +129,9 @@ fn mistakes_about_lens_drivers_are_named() {
         &moonlite("port = \"x\"\n[lens.moonlite]\nsteps = \"quarter\""),
         &["lens.moonlite.steps", "quarter", "half"],
     );
+    let optotune = |keys: &str| driver("optotune", &format!("port = \"x\"\n[lens.optotune]\n{keys}"));
+    refused(&optotune("quantity = \"diopters\""), &["lens.optotune.quantity", "diopters", "focal-power"]);
+    refused(&optotune("damping = 1.5"), &["line 7", "lens.optotune.damping", "1.5", "0.99"]);
 }
 
 #[test]

@@ -57,3 +57,12 @@ fn moonlite_focuses_as_well_as_the_plain_lens() -> Result<()> {
          [lens.moonlite]\nmax_speed_counts_per_s = 1000",
     )
 }
+
+#[test]
+fn optotune_focuses_as_well_as_the_plain_lens() -> Result<()> {
+    compare(
+        "optotune",
+        "backend = \"optotune\"\nport = \"emulated\"\npoll_ms = 1
+         [lens.optotune]\nmax_speed_counts_per_s = 1765",
+    )
+}

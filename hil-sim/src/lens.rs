@@ -17,6 +17,7 @@ use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
 use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 pub use config::{LensConfig, LensKind};
+pub(crate) use profile::Spring;
 pub(crate) use state::LensState;
 pub(crate) use trajectory::Command;
 

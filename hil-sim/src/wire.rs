@@ -8,6 +8,7 @@ mod fault;
 mod line;
 mod moonlite;
 mod motor;
+mod optotune;
 mod port;
 mod server;
 
@@ -18,6 +19,7 @@ use evfocus_core::HostMicros;
 pub use fault::WireFault;
 use moonlite::MoonLiteModel;
 pub(crate) use motor::Motor;
+use optotune::OptotuneModel;
 pub use port::WirePort;
 pub use server::Server;
 
@@ -48,10 +50,13 @@ pub(crate) trait Device: Send {
 pub enum Protocol {
     /// MoonLite focusers.
     MoonLite,
+    /// Optotune's Lens Driver 4.
+    Optotune,
 }
 
 named!(Protocol, "protocol", {
     MoonLite => "moonlite",
+    Optotune => "optotune",
 });
 
 impl Protocol {
@@ -59,12 +64,14 @@ impl Protocol {
     fn bytes_per_second(self) -> Option<f64> {
         match self {
             Self::MoonLite => Some(960.0),
+            Self::Optotune => Some(11_520.0),
         }
     }
 
     fn device(self, motor: Motor) -> Box<dyn Device> {
         match self {
             Self::MoonLite => Box::new(MoonLiteModel::new(motor)),
+            Self::Optotune => Box::new(OptotuneModel::new(motor)),
         }
     }
 }

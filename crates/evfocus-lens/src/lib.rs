@@ -9,7 +9,9 @@
 mod continuity;
 mod line;
 pub mod moonlite;
+pub mod optotune;
 mod port;
 
 pub use moonlite::MoonLite;
+pub use optotune::Optotune;
 pub use port::Port;

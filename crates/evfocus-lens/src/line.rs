@@ -20,8 +20,8 @@ pub(crate) enum Answer<T> {
     Incomplete,
     /// The answer.
     Whole(T),
-    /// No answer to this question.
-    Wrong,
+    /// No answer to this question, and why not.
+    Wrong(&'static str),
 }
 
 /// An answer, and when.
@@ -142,13 +142,13 @@ impl Line {
         parse: impl Fn(&[u8]) -> Answer<T>,
     ) -> Result<Timed<T>, DeviceError> {
         let mut buffer = [0; LONGEST_ANSWER];
-        let mut received = 0;
+        let (mut received, mut reason) = (0, "it does not end");
         for _ in 0..patience.attempts {
             self.drain()?;
             let requested = self.now();
             self.send(question)?;
             let deadline = self.now() + patience.timeout;
-            received = 0;
+            (received, reason) = (0, "it does not end");
             loop {
                 let (taken, free) = buffer.split_at_mut(received);
                 let length = if free.is_empty() { 0 } else { self.read(free, deadline)? };
@@ -161,14 +161,17 @@ impl Line {
                 match parse(buffer.get(..received).unwrap_or_default()) {
                     Answer::Incomplete => {}
                     Answer::Whole(value) => return Ok(Timed { requested, replied, value }),
-                    Answer::Wrong => break,
+                    Answer::Wrong(why) => {
+                        reason = why;
+                        break;
+                    }
                 }
             }
         }
-        Err(self.unanswered(question, patience, buffer.get(..received).unwrap_or_default()))
+        Err(self.unanswered(question, patience, buffer.get(..received).unwrap_or_default(), reason))
     }
 
-    fn unanswered(&self, question: &[u8], patience: Patience, seen: &[u8]) -> DeviceError {
+    fn unanswered(&self, question: &[u8], patience: Patience, seen: &[u8], reason: &str) -> DeviceError {
         let (question, timeout, attempts) = (question.escape_ascii(), patience.timeout, patience.attempts);
         if seen.is_empty() {
             let what = format!(
@@ -180,7 +183,8 @@ impl Line {
         }
         let shown = seen.get(..seen.len().min(SHOWN)).unwrap_or_default().escape_ascii();
         let what = format!(
-            "\"{shown}\" is no answer to \"{question}\", asked {attempts} times; check the baud rate, and that this is the {}",
+            "\"{shown}\" is no answer to \"{question}\" ({reason}), asked {attempts} times; check the baud rate, and that this is \
+                 the {}",
             self.model
         );
         self.error(DeviceErrorKind::Protocol, what)

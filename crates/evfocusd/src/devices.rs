@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use evfocus_core::controller::{Action, DeviceFailure};
 use evfocus_hal::{Camera, Clock, DeviceError, DeviceErrorKind, Lens};
-use evfocus_lens::{MoonLite, Port};
+use evfocus_lens::{MoonLite, Optotune, Port};
 
 use crate::config::{Config, LensBackend, LensDriver, LensPlace};
 
@@ -66,6 +66,7 @@ pub(crate) fn open_lens(
     let clock = Arc::clone(clock);
     Ok(match driver {
         LensDriver::MoonLite(config) => Box::new(MoonLite::open(port, *config, clock)?),
+        LensDriver::Optotune(config) => Box::new(Optotune::open(port, *config, clock)?),
     })
 }
 

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex};
 
-use evfocus_core::HostMicros;
+use evfocus_core::{HostMicros, LensRange};
 
-use crate::lens::{Command, LensState, lock};
+use crate::lens::{Command, LensState, Spring, lock};
 
 /// A handle to the rig's motor and its position read-out.
 #[derive(Debug, Clone)]
@@ -36,10 +36,19 @@ impl Motor {
         lock(&self.state).command(self.seconds(now), Command::Brake);
     }
 
+    /// Lets the glass swing to where `spring` rests, from `time` on; not before an earlier one.
+    pub(super) fn swing(&self, time: HostMicros, spring: Spring) {
+        lock(&self.state).command(self.seconds(time), Command::Swing(spring));
+    }
+
     /// What the position read-out says at `time`, counts, and whether the motor is driven.
     pub(super) fn report(&self, time: HostMicros) -> (f64, bool) {
         let seconds = self.seconds(time);
         lock(&self.state).report(seconds)
+    }
+
+    pub(super) fn range(&self) -> LensRange {
+        lock(&self.state).config().range
     }
 
     /// Counts per second.

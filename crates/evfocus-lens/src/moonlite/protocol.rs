@@ -86,7 +86,7 @@ pub(crate) fn position(bytes: &[u8]) -> Answer<u32> {
         match char::from(byte).to_digit(16) {
             Some(digit) if index < 8 => value = value << 4 | digit,
             None if byte == b'#' => return Answer::Whole(value),
-            Some(_) | None => return Answer::Wrong,
+            Some(_) | None => return Answer::Wrong("not hex digits and #"),
         }
     }
     Answer::Incomplete
@@ -96,7 +96,8 @@ pub(crate) fn position(bytes: &[u8]) -> Answer<u32> {
 pub(crate) fn is_moving(bytes: &[u8]) -> Answer<bool> {
     match position(bytes) {
         Answer::Whole(value @ (0 | 1)) => Answer::Whole(value == 1),
-        Answer::Whole(_) | Answer::Wrong => Answer::Wrong,
+        Answer::Whole(_) => Answer::Wrong("neither 0 nor 1"),
+        Answer::Wrong(why) => Answer::Wrong(why),
         Answer::Incomplete => Answer::Incomplete,
     }
 }
@@ -106,7 +107,7 @@ pub(crate) fn version(bytes: &[u8]) -> Answer<[u8; 2]> {
     let start = bytes.iter().position(|&byte| byte != b'#').unwrap_or(bytes.len());
     let digits = bytes.get(start..).unwrap_or_default();
     if !digits.iter().take(2).all(u8::is_ascii_alphanumeric) {
-        return Answer::Wrong;
+        return Answer::Wrong("not two digits");
     }
     digits.first_chunk().map_or(Answer::Incomplete, |&version| Answer::Whole(version))
 }
@@ -127,18 +128,18 @@ mod tests {
         assert_eq!(position(b"186A0#"), Answer::Whole(100_000));
         assert_eq!(position(b"#1064#"), Answer::Whole(4196));
         assert_eq!(position(b"106"), Answer::Incomplete);
-        assert_eq!(position(b"10x4#"), Answer::Wrong);
-        assert_eq!(position(b"123456789#"), Answer::Wrong);
+        assert!(matches!(position(b"10x4#"), Answer::Wrong(_)));
+        assert!(matches!(position(b"123456789#"), Answer::Wrong(_)));
         for (bytes, expected) in
             [(&b"01#"[..], true), (&b"00#"[..], false), (&b"1#"[..], true), (&b"0#"[..], false)]
         {
             assert_eq!(is_moving(bytes), Answer::Whole(expected));
         }
-        assert_eq!(is_moving(b"7F#"), Answer::Wrong);
+        assert!(matches!(is_moving(b"7F#"), Answer::Wrong(_)));
         assert_eq!(version(b"10"), Answer::Whole(*b"10"));
         assert_eq!(version(b"10#"), Answer::Whole(*b"10"));
         assert_eq!(version(b"1"), Answer::Incomplete);
-        assert_eq!(version(b"\xFF\x00"), Answer::Wrong);
+        assert!(matches!(version(b"\xFF\x00"), Answer::Wrong(_)));
     }
 
     #[test]

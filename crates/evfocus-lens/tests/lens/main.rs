@@ -4,3 +4,4 @@
 
 mod bench;
 mod moonlite;
+mod optotune;

@@ -5,11 +5,12 @@ mod drivers;
 use evfocus_core::{LensPosition, LensRange, LensSpeed};
 use evfocus_hal::LensInfo;
 use evfocus_lens::moonlite::{self, MoonLiteConfig};
+use evfocus_lens::optotune::{self, OptotuneConfig};
 use hil_sim::wire::Protocol;
 use serde::Deserialize;
 
 use super::BadValue;
-use drivers::MoonLiteSection;
+use drivers::{MoonLiteSection, OptotuneSection};
 
 /// The port that stands for the emulated controller before the simulated rig's lens.
 const EMULATED: &str = "emulated";
@@ -32,6 +33,8 @@ pub struct LensSection {
     pub poll_ms: f64,
     /// For `moonlite`.
     pub moonlite: MoonLiteSection,
+    /// For `optotune`.
+    pub optotune: OptotuneSection,
 }
 
 impl Default for LensSection {
@@ -44,6 +47,7 @@ impl Default for LensSection {
             max_counts: None,
             poll_ms: 2.0,
             moonlite: MoonLiteSection::default(),
+            optotune: OptotuneSection::default(),
         }
     }
 }
@@ -67,6 +71,8 @@ pub enum LensBackend {
 pub enum LensDriver {
     /// MoonLite focusers.
     MoonLite(MoonLiteConfig),
+    /// Optotune's Lens Driver 4.
+    Optotune(OptotuneConfig),
 }
 
 /// Where a lens is attached.
@@ -113,6 +119,9 @@ impl LensSection {
                 let config =
                     self.moonlite.config(self.range(0.0, f64::from(moonlite::protocol::HIGHEST))?)?;
                 (LensDriver::MoonLite(config), self.serial(moonlite::BAUD)?)
+            }
+            Protocol::Optotune => {
+                (LensDriver::Optotune(self.optotune.config()?), self.serial(optotune::BAUD)?)
             }
         };
         Ok(LensBackend::Driver { driver, place })
@@ -213,12 +222,15 @@ impl LensDriver {
     pub fn protocol(&self) -> Protocol {
         match self {
             Self::MoonLite(_) => Protocol::MoonLite,
+            Self::Optotune(_) => Protocol::Optotune,
         }
     }
 
     fn expected(&self) -> Option<LensInfo> {
         match self {
             Self::MoonLite(config) => Some(info(config.range, config.max_speed, false)),
+            // Its range is its own.
+            Self::Optotune(_) => None,
         }
     }
 }
