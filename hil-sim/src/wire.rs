@@ -5,6 +5,7 @@
 //! The models are written from the protocols' own papers, not from the drivers that they test.
 
 mod fault;
+mod grbl;
 mod line;
 mod moonlite;
 mod motor;
@@ -17,6 +18,7 @@ use std::fmt;
 use evfocus_core::HostMicros;
 
 pub use fault::WireFault;
+use grbl::GrblModel;
 use moonlite::MoonLiteModel;
 pub(crate) use motor::Motor;
 use optotune::OptotuneModel;
@@ -52,11 +54,14 @@ pub enum Protocol {
     MoonLite,
     /// Optotune's Lens Driver 4.
     Optotune,
+    /// A GRBL 1.1 CNC controller.
+    Grbl,
 }
 
 named!(Protocol, "protocol", {
     MoonLite => "moonlite",
     Optotune => "optotune",
+    Grbl => "grbl",
 });
 
 impl Protocol {
@@ -64,7 +69,7 @@ impl Protocol {
     fn bytes_per_second(self) -> Option<f64> {
         match self {
             Self::MoonLite => Some(960.0),
-            Self::Optotune => Some(11_520.0),
+            Self::Optotune | Self::Grbl => Some(11_520.0),
         }
     }
 
@@ -72,6 +77,7 @@ impl Protocol {
         match self {
             Self::MoonLite => Box::new(MoonLiteModel::new(motor)),
             Self::Optotune => Box::new(OptotuneModel::new(motor)),
+            Self::Grbl => Box::new(GrblModel::new(motor)),
         }
     }
 }

@@ -7,11 +7,13 @@
 //! Not their job: knowing each other, the daemon, or anything of focus.
 
 mod continuity;
+pub mod grbl;
 mod line;
 pub mod moonlite;
 pub mod optotune;
 mod port;
 
+pub use grbl::Grbl;
 pub use moonlite::MoonLite;
 pub use optotune::Optotune;
 pub use port::Port;

@@ -56,6 +56,11 @@ impl Motor {
         lock(&self.state).config().max_speed.counts_per_second()
     }
 
+    /// Whether there is a switch to home on, and homing is needed.
+    pub(super) fn needs_homing(&self) -> bool {
+        lock(&self.state).config().needs_homing
+    }
+
     pub(super) fn is_unplugged(&self, now: HostMicros) -> bool {
         lock(&self.state).unplugged(self.seconds(now))
     }
