@@ -5,6 +5,7 @@
 //! The models are written from the protocols' own papers, not from the drivers that they test.
 
 mod fault;
+mod firmata;
 mod grbl;
 mod line;
 mod moonlite;
@@ -18,6 +19,7 @@ use std::fmt;
 use evfocus_core::HostMicros;
 
 pub use fault::WireFault;
+use firmata::FirmataModel;
 use grbl::GrblModel;
 use moonlite::MoonLiteModel;
 pub(crate) use motor::Motor;
@@ -56,12 +58,15 @@ pub enum Protocol {
     Optotune,
     /// A GRBL 1.1 CNC controller.
     Grbl,
+    /// An Arduino with StandardFirmata, an H-bridge and a potentiometer.
+    Firmata,
 }
 
 named!(Protocol, "protocol", {
     MoonLite => "moonlite",
     Optotune => "optotune",
     Grbl => "grbl",
+    Firmata => "firmata",
 });
 
 impl Protocol {
@@ -70,6 +75,7 @@ impl Protocol {
         match self {
             Self::MoonLite => Some(960.0),
             Self::Optotune | Self::Grbl => Some(11_520.0),
+            Self::Firmata => Some(5_760.0),
         }
     }
 
@@ -78,6 +84,7 @@ impl Protocol {
             Self::MoonLite => Box::new(MoonLiteModel::new(motor)),
             Self::Optotune => Box::new(OptotuneModel::new(motor)),
             Self::Grbl => Box::new(GrblModel::new(motor)),
+            Self::Firmata => Box::new(FirmataModel::new(motor)),
         }
     }
 }

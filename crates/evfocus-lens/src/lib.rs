@@ -7,12 +7,15 @@
 //! Not their job: knowing each other, the daemon, or anything of focus.
 
 mod continuity;
+pub mod drive;
+pub mod firmata;
 pub mod grbl;
 mod line;
 pub mod moonlite;
 pub mod optotune;
 mod port;
 
+pub use firmata::Firmata;
 pub use grbl::Grbl;
 pub use moonlite::MoonLite;
 pub use optotune::Optotune;

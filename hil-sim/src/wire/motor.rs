@@ -69,3 +69,44 @@ impl Motor {
         lock(&self.state).silent(self.seconds(now))
     }
 }
+
+/// Share of the full drive below which the motor does not turn.
+const DEAD_BAND: f64 = 0.12;
+
+/// The rig's motor as a DC motor: driven by a voltage, ended by the ends of its way.
+#[derive(Debug)]
+pub(super) struct DcMotor {
+    motor: Motor,
+    drive: f64,
+}
+
+impl DcMotor {
+    pub(super) fn new(motor: Motor) -> Self {
+        Self { motor, drive: 0.0 }
+    }
+
+    pub(super) fn motor(&self) -> &Motor {
+        &self.motor
+    }
+
+    /// Puts `drive`, -1 to 1, on the motor.
+    pub(super) fn drive(&mut self, now: HostMicros, drive: f64) {
+        if (drive - self.drive).abs() < 1e-9 {
+            return;
+        }
+        self.drive = drive;
+        let share = (drive.abs() - DEAD_BAND) / (1.0 - DEAD_BAND);
+        let range = self.motor.range();
+        if share > 0.0 {
+            let end = if drive > 0.0 { range.max() } else { range.min() };
+            self.motor.travel(now, end.0, share * self.motor.max_speed());
+        } else {
+            self.motor.brake(now);
+        }
+    }
+
+    /// What the potentiometer says, counts.
+    pub(super) fn position(&self, time: HostMicros) -> f64 {
+        self.motor.report(time).0
+    }
+}

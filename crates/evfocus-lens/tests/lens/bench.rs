@@ -7,7 +7,7 @@ use evfocus_core::{HostMicros, LensPosition, LensSample};
 use evfocus_hal::{Clock, DeviceError, Lens, SystemClock, VirtualClock};
 use evfocus_lens::Port;
 use hil_sim::wire::{Protocol, WirePort};
-use hil_sim::{LensConfig, Rig, RigConfig};
+use hil_sim::{Fault, LensConfig, Rig, RigConfig};
 
 /// A rig, its clock, and the controller's port.
 pub(crate) struct Bench {
@@ -19,16 +19,22 @@ pub(crate) struct Bench {
 impl Bench {
     /// In virtual time.
     pub(crate) fn new(protocol: Protocol, lens: LensConfig) -> Self {
-        Self::on(Arc::new(VirtualClock::new()), protocol, lens)
+        Self::on(Arc::new(VirtualClock::new()), protocol, RigConfig { lens, ..RigConfig::default() })
+    }
+
+    /// The same in another rig, in which things go wrong.
+    pub(crate) fn with_faults(&self, protocol: Protocol, faults: Vec<Fault>) -> Self {
+        let config = RigConfig { faults, ..self.rig.config().clone() };
+        Self::on(Arc::new(VirtualClock::new()), protocol, config)
     }
 
     /// In real time.
     pub(crate) fn live(protocol: Protocol, lens: LensConfig) -> Self {
-        Self::on(Arc::new(SystemClock::new()), protocol, lens)
+        Self::on(Arc::new(SystemClock::new()), protocol, RigConfig { lens, ..RigConfig::default() })
     }
 
-    fn on(clock: Arc<dyn Clock>, protocol: Protocol, lens: LensConfig) -> Self {
-        let rig = Rig::new(RigConfig { lens, ..RigConfig::default() }, Arc::clone(&clock)).unwrap();
+    fn on(clock: Arc<dyn Clock>, protocol: Protocol, config: RigConfig) -> Self {
+        let rig = Rig::new(config, Arc::clone(&clock)).unwrap();
         let wire = rig.wire(protocol);
         Self { clock, rig, wire }
     }

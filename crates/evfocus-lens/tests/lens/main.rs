@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a failed unwrap is a failed test")]
 
 mod bench;
+mod firmata;
 mod grbl;
 mod moonlite;
 mod optotune;
