@@ -7,6 +7,7 @@
 mod fault;
 mod firmata;
 mod grbl;
+mod labjack;
 mod line;
 mod moonlite;
 mod motor;
@@ -15,12 +16,14 @@ mod port;
 mod server;
 
 use std::fmt;
+use std::time::Duration;
 
 use evfocus_core::HostMicros;
 
 pub use fault::WireFault;
 use firmata::FirmataModel;
 use grbl::GrblModel;
+use labjack::LabJackModel;
 use moonlite::MoonLiteModel;
 pub(crate) use motor::Motor;
 use optotune::OptotuneModel;
@@ -60,6 +63,8 @@ pub enum Protocol {
     Grbl,
     /// An Arduino with StandardFirmata, an H-bridge and a potentiometer.
     Firmata,
+    /// A LabJack T7 with a motor stage and a potentiometer.
+    LabJack,
 }
 
 named!(Protocol, "protocol", {
@@ -67,6 +72,7 @@ named!(Protocol, "protocol", {
     Optotune => "optotune",
     Grbl => "grbl",
     Firmata => "firmata",
+    LabJack => "labjack",
 });
 
 impl Protocol {
@@ -76,6 +82,16 @@ impl Protocol {
             Self::MoonLite => Some(960.0),
             Self::Optotune | Self::Grbl => Some(11_520.0),
             Self::Firmata => Some(5_760.0),
+            Self::LabJack => None,
+        }
+    }
+
+    /// From a question to the answer, besides their time on the line.
+    fn latency(self) -> Duration {
+        match self {
+            Self::MoonLite | Self::Optotune | Self::Grbl | Self::Firmata => Duration::ZERO,
+            // On Ethernet, by its data sheet.
+            Self::LabJack => Duration::from_millis(1),
         }
     }
 
@@ -85,6 +101,7 @@ impl Protocol {
             Self::Optotune => Box::new(OptotuneModel::new(motor)),
             Self::Grbl => Box::new(GrblModel::new(motor)),
             Self::Firmata => Box::new(FirmataModel::new(motor)),
+            Self::LabJack => Box::new(LabJackModel::new(motor)),
         }
     }
 }

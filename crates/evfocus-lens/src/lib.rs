@@ -10,6 +10,7 @@ mod continuity;
 pub mod drive;
 pub mod firmata;
 pub mod grbl;
+pub mod labjack;
 mod line;
 pub mod moonlite;
 pub mod optotune;
@@ -17,6 +18,7 @@ mod port;
 
 pub use firmata::Firmata;
 pub use grbl::Grbl;
+pub use labjack::LabJack;
 pub use moonlite::MoonLite;
 pub use optotune::Optotune;
 pub use port::Port;

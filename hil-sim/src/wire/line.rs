@@ -17,6 +17,7 @@ pub(super) struct Line {
     device: Box<dyn Device>,
     motor: Motor,
     bytes_per_second: Option<f64>,
+    latency: Duration,
     /// Bytes that are on their way to the host or wait there, with their arrival.
     outgoing: VecDeque<(HostMicros, u8)>,
     /// When the line is free again.
@@ -32,6 +33,7 @@ impl Line {
             device: protocol.device(motor.clone()),
             motor,
             bytes_per_second: protocol.bytes_per_second(),
+            latency: protocol.latency(),
             outgoing: VecDeque::new(),
             free: HostMicros(0),
             fault: None,
@@ -110,7 +112,7 @@ impl Line {
 
     /// Sends `reply` on its way at `now`.
     fn reply(&mut self, mut reply: Vec<u8>, now: HostMicros) {
-        let mut start = now.max(self.free);
+        let mut start = (now + self.latency).max(self.free);
         if let Some(fault) = self.fault {
             fault.spoil(&mut reply);
             if let WireFault::SlowReplies(delay) = fault {

@@ -5,5 +5,6 @@
 mod bench;
 mod firmata;
 mod grbl;
+mod labjack;
 mod moonlite;
 mod optotune;
