@@ -7,6 +7,7 @@
 mod fault;
 mod firmata;
 mod grbl;
+mod indi;
 mod labjack;
 mod line;
 mod moonlite;
@@ -23,6 +24,7 @@ use evfocus_core::HostMicros;
 pub use fault::WireFault;
 use firmata::FirmataModel;
 use grbl::GrblModel;
+use indi::IndiModel;
 use labjack::LabJackModel;
 use moonlite::MoonLiteModel;
 pub(crate) use motor::Motor;
@@ -65,6 +67,8 @@ pub enum Protocol {
     Firmata,
     /// A LabJack T7 with a motor stage and a potentiometer.
     LabJack,
+    /// An INDI server with a focuser.
+    Indi,
 }
 
 named!(Protocol, "protocol", {
@@ -73,6 +77,7 @@ named!(Protocol, "protocol", {
     Grbl => "grbl",
     Firmata => "firmata",
     LabJack => "labjack",
+    Indi => "indi",
 });
 
 impl Protocol {
@@ -82,7 +87,7 @@ impl Protocol {
             Self::MoonLite => Some(960.0),
             Self::Optotune | Self::Grbl => Some(11_520.0),
             Self::Firmata => Some(5_760.0),
-            Self::LabJack => None,
+            Self::LabJack | Self::Indi => None,
         }
     }
 
@@ -92,6 +97,8 @@ impl Protocol {
             Self::MoonLite | Self::Optotune | Self::Grbl | Self::Firmata => Duration::ZERO,
             // On Ethernet, by its data sheet.
             Self::LabJack => Duration::from_millis(1),
+            // Two programs on the same machine.
+            Self::Indi => Duration::from_micros(200),
         }
     }
 
@@ -102,6 +109,7 @@ impl Protocol {
             Self::Grbl => Box::new(GrblModel::new(motor)),
             Self::Firmata => Box::new(FirmataModel::new(motor)),
             Self::LabJack => Box::new(LabJackModel::new(motor)),
+            Self::Indi => Box::new(IndiModel::new(motor)),
         }
     }
 }

@@ -172,9 +172,8 @@ impl Firmata {
 
     /// The next message and its arrival, or nothing by `deadline`.
     fn next(&mut self, deadline: HostMicros) -> Result<Option<(Message, HostMicros)>, DeviceError> {
-        let mut byte = [0];
-        while self.line.read(&mut byte, deadline)? > 0 {
-            if let Some(message) = byte.first().and_then(|&byte| self.decoder.push(byte)) {
+        while let Some(byte) = self.line.next_byte(deadline)? {
+            if let Some(message) = self.decoder.push(byte) {
                 return Ok(Some((message, self.line.now())));
             }
         }

@@ -247,9 +247,8 @@ impl Grbl {
 
 /// The next message, or nothing by `deadline`.
 fn next(line: &mut Line, lines: &mut Lines, deadline: HostMicros) -> Result<Option<Message>, DeviceError> {
-    let mut byte = [0];
-    while line.read(&mut byte, deadline)? > 0 {
-        if let Some(message) = byte.first().and_then(|&byte| lines.push(byte)) {
+    while let Some(byte) = line.next_byte(deadline)? {
+        if let Some(message) = lines.push(byte) {
             return Ok(Some(message));
         }
     }

@@ -10,6 +10,7 @@ mod continuity;
 pub mod drive;
 pub mod firmata;
 pub mod grbl;
+pub mod indi;
 pub mod labjack;
 mod line;
 pub mod moonlite;
@@ -18,6 +19,7 @@ mod port;
 
 pub use firmata::Firmata;
 pub use grbl::Grbl;
+pub use indi::Indi;
 pub use labjack::LabJack;
 pub use moonlite::MoonLite;
 pub use optotune::Optotune;

@@ -1,5 +1,6 @@
 //! A driver's end of its port: one question at a time, with bounded waits and retries, and errors that say where and what.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -44,6 +45,8 @@ pub(crate) struct Line {
     place: String,
     connect: Connect,
     transport: Option<Box<dyn Transport>>,
+    /// What was read and not yet taken byte by byte.
+    inbox: VecDeque<u8>,
     clock: Arc<dyn Clock>,
 }
 
@@ -58,7 +61,14 @@ impl std::fmt::Debug for Line {
 
 impl Line {
     pub(crate) fn new(model: &'static str, port: Port, clock: Arc<dyn Clock>) -> Self {
-        Self { model, place: port.place, connect: port.connect, transport: None, clock }
+        Self {
+            model,
+            place: port.place,
+            connect: port.connect,
+            transport: None,
+            inbox: VecDeque::new(),
+            clock,
+        }
     }
 
     pub(crate) fn place(&self) -> &str {
@@ -74,6 +84,7 @@ impl Line {
     }
 
     pub(crate) fn open(&mut self) -> Result<(), DeviceError> {
+        self.inbox.clear();
         let opened = (self.connect)();
         self.transport = Some(opened.map_err(|error| self.named(error))?);
         Ok(())
@@ -122,11 +133,22 @@ impl Line {
         self.with(|transport| transport.write(bytes))
     }
 
-    pub(crate) fn read(&mut self, buffer: &mut [u8], deadline: HostMicros) -> Result<usize, DeviceError> {
+    fn read(&mut self, buffer: &mut [u8], deadline: HostMicros) -> Result<usize, DeviceError> {
         self.with(|transport| transport.read(buffer, deadline))
     }
 
+    /// The next byte of a stream, or nothing by `deadline`.
+    pub(crate) fn next_byte(&mut self, deadline: HostMicros) -> Result<Option<u8>, DeviceError> {
+        if self.inbox.is_empty() {
+            let mut buffer = [0; LONGEST_ANSWER];
+            let length = self.read(&mut buffer, deadline)?;
+            self.inbox.extend(buffer.iter().take(length));
+        }
+        Ok(self.inbox.pop_front())
+    }
+
     pub(crate) fn drain(&mut self) -> Result<(), DeviceError> {
+        self.inbox.clear();
         self.with(|transport| transport.drain())
     }
 

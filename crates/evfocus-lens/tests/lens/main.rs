@@ -5,6 +5,7 @@
 mod bench;
 mod firmata;
 mod grbl;
+mod indi;
 mod labjack;
 mod moonlite;
 mod optotune;
