@@ -129,6 +129,29 @@ fn mistakes_about_lens_drivers_are_named() {
         &moonlite("port = \"x\"\n[lens.moonlite]\nsteps = \"quarter\""),
         &["lens.moonlite.steps", "quarter", "half"],
     );
+    refused(&driver("grbl", "port = \"x\"\n[lens.grbl]\naxis = \"A\""), &["lens.grbl.axis", "A", "X"]);
+    refused(
+        &driver("firmata", "port = \"x\"\npoll_ms = 50"),
+        &["line 6", "lens.poll_ms", "50", "steers", "at most 10"],
+    );
+    refused(
+        &driver("firmata", "port = \"x\"\n[lens.firmata]\ndirection_pin = 3"),
+        &["line 7", "lens.firmata.direction_pin", "another pin"],
+    );
+    refused(
+        &driver("labjack", "address = \"emulated\"\n[lens.drive]\ncounts_at_full = 2000"),
+        &["line 4", "lens.max_counts", "3000", "2000"],
+    );
+    refused(&driver("labjack", "address = \"10.0.0.5\""), &["line 5", "lens.address", "10.0.0.5", ":502"]);
+    refused(&driver("labjack", "port = \"/dev/ttyUSB0\""), &["line 5", "lens.port", "lens.address"]);
+    refused(
+        &driver("indi", "address = \"localhost:7624\""),
+        &["lens.indi.device", "missing", "indi_getprop"],
+    );
+    refused(
+        &driver("indi", "address = \"a:1\"\n[lens.indi]\ndevice = \"F\"\npolling_ms = 1"),
+        &["line 8", "lens.indi.polling_ms", "1", "10"],
+    );
     let optotune = |keys: &str| driver("optotune", &format!("port = \"x\"\n[lens.optotune]\n{keys}"));
     refused(&optotune("quantity = \"diopters\""), &["lens.optotune.quantity", "diopters", "focal-power"]);
     refused(&optotune("damping = 1.5"), &["line 7", "lens.optotune.damping", "1.5", "0.99"]);

@@ -146,7 +146,8 @@ impl LabJack {
         } else {
             0.0
         };
-        if self.output == [speed, direction] { Ok(()) } else { self.write([speed, direction]) }
+        let volts = [speed, direction];
+        if self.output.map(f32::to_bits) == volts.map(f32::to_bits) { Ok(()) } else { self.write(volts) }
     }
 
     /// Cuts the motor off, whatever was put out before.

@@ -13,7 +13,10 @@ use evfocus_core::controller::{FocusRequest, Mode, Refusal};
 use serde::Deserialize;
 
 pub use focus::FocusSection;
-pub use lens::{LensBackend, LensDriver, LensPlace, LensSection};
+pub use lens::{
+    DriveSection, FirmataSection, GrblSection, IndiSection, LabJackSection, LensBackend, LensDriver,
+    LensPlace, LensSection, MoonLiteSection, OptotuneSection, SettingSection,
+};
 pub use simulation::{FaultSection, SimulationSection};
 pub(crate) use value::BadValue;
 

@@ -99,7 +99,6 @@ impl Running {
         let mut settings = config
             .controller(&lens_info)
             .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
-        let limits = settings.limits;
         let store = Reports::new(ReportStore::open(&config.state_dir, config.reports_kept));
         if let Some(fault) = store.fault() {
             tracing::error!(%fault, "reports are kept in memory only");
@@ -109,7 +108,7 @@ impl Running {
         let rig_delay = (store.fault().is_none())
             .then(|| RigDelayFile::new(&config.state_dir, &run_devices.camera, &run_devices.lens));
         settings.delays = rig_delay.as_ref().and_then(RigDelayFile::read).unwrap_or_default();
-        let (saved_delays, pace) = (settings.delays, settings.pace);
+        let (saved_delays, pace, limits) = (settings.delays, settings.pace, settings.limits);
         let mut controller = Controller::new(settings, camera_info.geometry, clock.now());
         controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
         if config.mode == Mode::Manual {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use evfocus_core::controller::{Action, DeviceFailure};
 use evfocus_hal::{Camera, Clock, DeviceError, DeviceErrorKind, Lens};
-use evfocus_lens::{MoonLite, Optotune, Port};
+use evfocus_lens::{Firmata, Grbl, Indi, LabJack, MoonLite, Optotune, Port};
 
 use crate::config::{Config, LensBackend, LensDriver, LensPlace};
 
@@ -67,6 +67,10 @@ pub(crate) fn open_lens(
     Ok(match driver {
         LensDriver::MoonLite(config) => Box::new(MoonLite::open(port, *config, clock)?),
         LensDriver::Optotune(config) => Box::new(Optotune::open(port, *config, clock)?),
+        LensDriver::Grbl(config) => Box::new(Grbl::open(port, *config, clock)?),
+        LensDriver::Firmata(config) => Box::new(Firmata::open(port, *config, clock)?),
+        LensDriver::LabJack(config) => Box::new(LabJack::open(port, *config, clock)?),
+        LensDriver::Indi(config) => Box::new(Indi::open(port, config.clone(), clock)?),
     })
 }
 

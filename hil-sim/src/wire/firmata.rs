@@ -81,7 +81,7 @@ impl FirmataModel {
                 self.next_reading = now + self.interval;
             }
             [command, low, high] if command == 0xE0 | PWM_PIN => {
-                self.duty = (low | high << 7).min(255);
+                self.duty = (u16::from(low) | u16::from(high) << 7).min(255) as u8;
                 self.drive(now);
             }
             [0xF5, DIRECTION_PIN, level] => {

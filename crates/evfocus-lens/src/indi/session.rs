@@ -168,11 +168,7 @@ impl Session {
                 false
             }
             Message::Gone { device, name } if device == self.device => {
-                if name.is_empty() {
-                    self.properties.clear()
-                } else {
-                    drop(self.properties.remove(&name))
-                }
+                self.properties.retain(|known, _| !name.is_empty() && *known != name);
                 false
             }
             Message::Property(_) | Message::Text { .. } | Message::Gone { .. } => false,

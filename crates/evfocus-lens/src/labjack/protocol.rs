@@ -58,7 +58,7 @@ pub fn write(transaction: u16, register: u16, values: &[f32]) -> Vec<u8> {
 fn answer(transaction: u16, mut bytes: &[u8]) -> Answer<&[u8]> {
     while let Some(&[high, low, 0, 0, length_high, length_low]) = bytes.first_chunk::<HEADER>() {
         let length = usize::from(u16::from_be_bytes([length_high, length_low]));
-        if length < 3 || length > LONGEST_FRAME {
+        if !(3..=LONGEST_FRAME).contains(&length) {
             return Answer::Wrong("no frame has this length");
         }
         let Some((body, rest)) = bytes.get(HEADER..).and_then(|rest| rest.split_at_checked(length)) else {

@@ -1,6 +1,6 @@
 //! Every driver against the model of its device: in virtual time, and on a pseudo-terminal or a socket.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a failed unwrap is a failed test")]
+#![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod bench;
 mod firmata;

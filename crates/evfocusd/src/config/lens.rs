@@ -4,16 +4,26 @@ mod drivers;
 
 use evfocus_core::{LensPosition, LensRange, LensSpeed};
 use evfocus_hal::LensInfo;
+use evfocus_lens::firmata::{self, FirmataConfig};
+use evfocus_lens::grbl::{self, GrblConfig};
+use evfocus_lens::indi::{self, IndiConfig};
+use evfocus_lens::labjack::{self, LabJackConfig};
 use evfocus_lens::moonlite::{self, MoonLiteConfig};
 use evfocus_lens::optotune::{self, OptotuneConfig};
 use hil_sim::wire::Protocol;
 use serde::Deserialize;
 
 use super::BadValue;
-use drivers::{MoonLiteSection, OptotuneSection};
+pub use drivers::{
+    DriveSection, FirmataSection, GrblSection, IndiSection, LabJackSection, MoonLiteSection, OptotuneSection,
+    SettingSection,
+};
 
 /// The port that stands for the emulated controller before the simulated rig's lens.
 const EMULATED: &str = "emulated";
+
+/// A lens that the host steers is steered at least this often.
+const SLOWEST_STEERING_MS: f64 = 10.0;
 
 /// `[lens]`
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -35,6 +45,16 @@ pub struct LensSection {
     pub moonlite: MoonLiteSection,
     /// For `optotune`.
     pub optotune: OptotuneSection,
+    /// For `grbl`.
+    pub grbl: GrblSection,
+    /// For `firmata`.
+    pub firmata: FirmataSection,
+    /// For `labjack`.
+    pub labjack: LabJackSection,
+    /// Motor and potentiometer, for `firmata` and `labjack`.
+    pub drive: DriveSection,
+    /// For `indi`.
+    pub indi: IndiSection,
 }
 
 impl Default for LensSection {
@@ -48,6 +68,11 @@ impl Default for LensSection {
             poll_ms: 2.0,
             moonlite: MoonLiteSection::default(),
             optotune: OptotuneSection::default(),
+            grbl: GrblSection::default(),
+            firmata: FirmataSection::default(),
+            labjack: LabJackSection::default(),
+            drive: DriveSection::default(),
+            indi: IndiSection::default(),
         }
     }
 }
@@ -73,6 +98,14 @@ pub enum LensDriver {
     MoonLite(MoonLiteConfig),
     /// Optotune's Lens Driver 4.
     Optotune(OptotuneConfig),
+    /// A GRBL controller.
+    Grbl(GrblConfig),
+    /// A Firmata board, a motor and a potentiometer.
+    Firmata(FirmataConfig),
+    /// A LabJack, a motor and a potentiometer.
+    LabJack(LabJackConfig),
+    /// A focuser of an INDI server.
+    Indi(IndiConfig),
 }
 
 /// Where a lens is attached.
@@ -123,6 +156,18 @@ impl LensSection {
             Protocol::Optotune => {
                 (LensDriver::Optotune(self.optotune.config()?), self.serial(optotune::BAUD)?)
             }
+            Protocol::Grbl => {
+                (LensDriver::Grbl(self.grbl.config(self.range(-1e7, 1e7)?)?), self.serial(grbl::BAUD)?)
+            }
+            Protocol::Firmata => {
+                let config = self.firmata.config(self.steered_range()?, &self.drive)?;
+                (LensDriver::Firmata(config), self.serial(firmata::BAUD)?)
+            }
+            Protocol::LabJack => {
+                let config = self.labjack.config(self.steered_range()?, &self.drive)?;
+                (LensDriver::LabJack(config), self.tcp(labjack::PORT)?)
+            }
+            Protocol::Indi => (LensDriver::Indi(self.indi.config()?), self.tcp(indi::PORT)?),
         };
         Ok(LensBackend::Driver { driver, place })
     }
@@ -156,6 +201,37 @@ impl LensSection {
         let max = end("lens.max_counts", self.max_counts)?;
         LensRange::new(LensPosition(min), LensPosition(max))
             .map_err(|error| BadValue::new("lens.min_counts", min, error.to_string()))
+    }
+
+    /// The range of a lens that the host steers, step by step with each poll.
+    fn steered_range(&self) -> Result<LensRange, BadValue> {
+        if self.poll_ms > SLOWEST_STEERING_MS {
+            let remedy =
+                format!("{} steers the lens with each poll; at most {SLOWEST_STEERING_MS}", self.backend);
+            return Err(BadValue::new("lens.poll_ms", self.poll_ms, remedy));
+        }
+        self.range(-1e6, 1e6)
+    }
+
+    fn tcp(&self, port: u16) -> Result<LensPlace, BadValue> {
+        if let Some(port) = &self.port {
+            let remedy = format!("{} is reached over TCP; give lens.address instead", self.backend);
+            return Err(BadValue::new("lens.port", port, remedy));
+        }
+        match self.address.as_deref() {
+            Some(EMULATED) => Ok(LensPlace::Emulated),
+            Some(address)
+                if address
+                    .rsplit_once(':')
+                    .is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok()) =>
+            {
+                Ok(LensPlace::Tcp(address.to_owned()))
+            }
+            given => {
+                let remedy = format!("give host:port, for example \"localhost:{port}\"; or \"emulated\"");
+                Err(BadValue::new("lens.address", given.unwrap_or("missing"), remedy))
+            }
+        }
     }
 
     fn serial(&self, baud: u32) -> Result<LensPlace, BadValue> {
@@ -223,14 +299,21 @@ impl LensDriver {
         match self {
             Self::MoonLite(_) => Protocol::MoonLite,
             Self::Optotune(_) => Protocol::Optotune,
+            Self::Grbl(_) => Protocol::Grbl,
+            Self::Firmata(_) => Protocol::Firmata,
+            Self::LabJack(_) => Protocol::LabJack,
+            Self::Indi(_) => Protocol::Indi,
         }
     }
 
     fn expected(&self) -> Option<LensInfo> {
         match self {
             Self::MoonLite(config) => Some(info(config.range, config.max_speed, false)),
-            // Its range is its own.
-            Self::Optotune(_) => None,
+            Self::Firmata(FirmataConfig { drive, .. }) | Self::LabJack(LabJackConfig { drive, .. }) => {
+                Some(info(drive.range, drive.max_speed, false))
+            }
+            // Their ranges or speeds are their own.
+            Self::Optotune(_) | Self::Grbl(_) | Self::Indi(_) => None,
         }
     }
 }

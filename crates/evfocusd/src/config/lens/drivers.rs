@@ -1,6 +1,13 @@
 //! The sections of single drivers: what their protocols do not tell.
 
+mod drive;
+mod indi;
+
 use evfocus_core::{LensRange, LensSpeed};
+use evfocus_lens::firmata::FirmataConfig;
+use evfocus_lens::grbl::GrblConfig;
+use evfocus_lens::grbl::protocol::Axis;
+use evfocus_lens::labjack::LabJackConfig;
 use evfocus_lens::moonlite::MoonLiteConfig;
 use evfocus_lens::moonlite::protocol::StepMode;
 use evfocus_lens::optotune::{OptotuneConfig, Quantity, ResponseConfig};
@@ -8,6 +15,8 @@ use serde::Deserialize;
 
 use crate::config::BadValue;
 use crate::config::value::set_choice;
+pub use drive::DriveSection;
+pub use indi::{IndiSection, SettingSection};
 
 /// A speed from a number of counts per second.
 fn speed(key: &str, value: f64) -> Result<LensSpeed, BadValue> {
@@ -82,5 +91,106 @@ impl OptotuneSection {
         };
         let max_speed = speed("lens.optotune.max_speed_counts_per_s", self.max_speed_counts_per_s)?;
         Ok(OptotuneConfig { quantity, max_speed, response })
+    }
+}
+
+/// `[lens.grbl]`
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GrblSection {
+    /// `X` (default), `Y` or `Z`.
+    pub axis: String,
+    /// Whether the machine has switches and must be homed before it moves; default no.
+    pub homing: bool,
+}
+
+impl Default for GrblSection {
+    fn default() -> Self {
+        Self { axis: "X".to_owned(), homing: false }
+    }
+}
+
+impl GrblSection {
+    pub(super) fn config(&self, range: LensRange) -> Result<GrblConfig, BadValue> {
+        let mut axis = Axis::X;
+        let choices = [("X", Axis::X), ("Y", Axis::Y), ("Z", Axis::Z)];
+        set_choice(&mut axis, "lens.grbl.axis", Some(&self.axis), &choices)?;
+        Ok(GrblConfig { axis, range, needs_homing: self.homing })
+    }
+}
+
+/// `[lens.firmata]`
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FirmataSection {
+    /// The pin that enables the H-bridge; it must do PWM. Default 3.
+    pub pwm_pin: u8,
+    /// The pin that tells the H-bridge which way; default 4.
+    pub direction_pin: u8,
+    /// The analog input of the potentiometer, 0 (A0, default) to 15.
+    pub channel: u8,
+}
+
+impl Default for FirmataSection {
+    fn default() -> Self {
+        Self { pwm_pin: 3, direction_pin: 4, channel: 0 }
+    }
+}
+
+impl FirmataSection {
+    pub(super) fn config(&self, range: LensRange, drive: &DriveSection) -> Result<FirmataConfig, BadValue> {
+        let Self { pwm_pin, direction_pin, channel } = *self;
+        for (key, pin) in [("lens.firmata.pwm_pin", pwm_pin), ("lens.firmata.direction_pin", direction_pin)] {
+            BadValue::check(key, f64::from(pin), 0.0, 127.0)?;
+        }
+        BadValue::check("lens.firmata.channel", f64::from(channel), 0.0, 15.0)?;
+        if pwm_pin == direction_pin {
+            let remedy = "it must be another pin than lens.firmata.pwm_pin";
+            return Err(BadValue::new("lens.firmata.direction_pin", direction_pin, remedy));
+        }
+        Ok(FirmataConfig { pwm_pin, direction_pin, channel, drive: drive.config(range)? })
+    }
+}
+
+/// `[lens.labjack]`
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LabJackSection {
+    /// The analog input of the potentiometer, 0 (AIN0, default) to 13.
+    pub channel: u8,
+    /// The voltage over the potentiometer, volts; 0.1 to 10, default 5.
+    pub reference_volts: f64,
+    /// The voltage on DAC0 at full drive, volts; 0.1 to 5, default 5.
+    pub full_drive_volts: f64,
+    /// The voltage on DAC1 for the positive direction, volts; 0.1 to 5, default 5.
+    pub direction_volts: f64,
+}
+
+impl Default for LabJackSection {
+    fn default() -> Self {
+        Self { channel: 0, reference_volts: 5.0, full_drive_volts: 5.0, direction_volts: 5.0 }
+    }
+}
+
+impl LabJackSection {
+    pub(super) fn config(&self, range: LensRange, drive: &DriveSection) -> Result<LabJackConfig, BadValue> {
+        BadValue::check("lens.labjack.channel", f64::from(self.channel), 0.0, 13.0)?;
+        Ok(LabJackConfig {
+            channel: self.channel,
+            reference_volts: BadValue::check(
+                "lens.labjack.reference_volts",
+                self.reference_volts,
+                0.1,
+                10.0,
+            )?,
+            full_drive_volts: BadValue::check(
+                "lens.labjack.full_drive_volts",
+                self.full_drive_volts,
+                0.1,
+                5.0,
+            )?,
+            direction_volts: BadValue::check("lens.labjack.direction_volts", self.direction_volts, 0.1, 5.0)?,
+            drive: drive.config(range)?,
+        })
     }
 }
