@@ -1,6 +1,8 @@
 //! Whole focus runs through each lens driver and the model of its device, in virtual time: bytes on a line between the
 //! controller and the lens that the simulated camera looks through.
 
+#![expect(clippy::print_stdout, reason = "the figures belong in the output")]
+
 use std::path::Path;
 
 use anyhow::{Context, Result};
