@@ -1,7 +1,7 @@
 //! Serves an emulated lens controller to other programs until its standard input ends.
 //!
 //! `cargo run -p hil-sim --example wire -- moonlite` prints the path of a pseudo-terminal, or for protocols over TCP an address on
-//! the loopback interface, and then each second where the glass is.
+//! the loopback interface, and then ten times a second where the glass is.
 
 use std::io::{Read, Write};
 use std::sync::Arc;
@@ -31,7 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         std::io::stdin().read_to_end(&mut Vec::new()).unwrap_or_default();
         drop(ended_in);
     });
-    while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(Duration::from_secs(1)) as Result<(), _> {
+    while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(Duration::from_millis(100)) as Result<(), _>
+    {
         writeln!(out, "{:.1}", rig.glass(clock.now()).0)?;
         out.flush()?;
     }

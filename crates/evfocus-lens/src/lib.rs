@@ -23,4 +23,4 @@ pub use indi::Indi;
 pub use labjack::LabJack;
 pub use moonlite::MoonLite;
 pub use optotune::Optotune;
-pub use port::Port;
+pub use port::{Port, UsbPort, usb_ports};

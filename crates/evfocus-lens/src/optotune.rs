@@ -174,7 +174,7 @@ fn greet(line: &mut Line, quantity: Quantity) -> Result<Greeting, DeviceError> {
 
 fn introduce(line: &mut Line, quantity: Quantity) -> Result<Greeting, DeviceError> {
     line.ask(protocol::START, GREETING, protocol::ready)?;
-    let firmware = line.ask(&Command::FirmwareType.encode(), USUAL, protocol::payload::<1>)?.value;
+    let firmware = line.ask(&Command::FirmwareType.encode(), USUAL, protocol::payload::<2>)?.value;
     let serial = line.ask(&Command::SerialNumber.encode(), USUAL, protocol::payload::<9>)?.value;
     let serial = String::from_utf8_lossy(serial.get(1..).unwrap_or_default()).trim().to_owned();
     let (low, high) = match quantity {
@@ -196,7 +196,7 @@ fn introduce(line: &mut Line, quantity: Quantity) -> Result<Greeting, DeviceErro
     })?;
     let set_point = read_back(line, quantity)?;
     tracing::info!(
-        port = line.place(), firmware = %firmware.escape_ascii(), serial, %range, set_point, "Optotune Lens Driver"
+        port = line.place(), firmware = %char::from(firmware[1]), serial, %range, set_point, "Optotune Lens Driver"
     );
     Ok(Greeting { serial, range, set_point })
 }

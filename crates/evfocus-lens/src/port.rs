@@ -1,5 +1,6 @@
 //! Where a lens is attached.
 
+mod list;
 mod serial;
 mod tcp;
 
@@ -7,6 +8,8 @@ use std::fmt;
 use std::sync::Arc;
 
 use evfocus_hal::{Clock, Connect};
+
+pub use list::{UsbPort, usb_ports};
 
 /// A place at which a lens is attached, and how to connect to it.
 pub struct Port {

@@ -292,7 +292,7 @@ impl Lookups for DaemonLookups {
             };
         let simulated = ("simulated", "simulated");
         let lens = (self.backend.name(), self.backend.location());
-        Ok(vec![
+        let mut devices = vec![
             device(
                 DeviceRole::Camera,
                 simulated,
@@ -301,7 +301,9 @@ impl Lookups for DaemonLookups {
                 status.camera.is_some(),
             ),
             device(DeviceRole::Lens, lens, &self.lens.model, &self.lens.serial, status.lens.is_some()),
-        ])
+        ];
+        devices.extend(devices::free_ports(self.backend.location()));
+        Ok(devices)
     }
 
     fn report(&self, id: Option<u64>) -> Result<Report, Error> {

@@ -33,9 +33,9 @@ impl Spring {
         (self.rest + offset, envelope * omega * (across * cos - along * sin) - decay * offset)
     }
 
-    /// By then what is left of a step is below a thousandth of it.
+    /// By then what is left of a step is below a hundred-thousandth of it.
     fn settling(&self) -> f64 {
-        7.0 / (self.damping * std::f64::consts::TAU * self.natural_hz)
+        12.0 / (self.damping * std::f64::consts::TAU * self.natural_hz)
     }
 }
 

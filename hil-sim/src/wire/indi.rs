@@ -77,23 +77,31 @@ impl IndiModel {
         let period = self.period.as_millis().to_string();
         define("Number", "POLLING_PERIOD", &[("PERIOD_MS", period, 10.0, 600_000.0)]);
         if self.connected {
-            let range = self.motor.range();
-            let position = self.position(now).to_string();
-            let (min, max) = (range.min().0, range.max().0);
-            define("Number", "ABS_FOCUS_POSITION", &[("FOCUS_ABSOLUTE_POSITION", position, min, max)]);
+            // Before the driver has asked the focuser; the update below is true.
+            define(
+                "Number",
+                "ABS_FOCUS_POSITION",
+                &[("FOCUS_ABSOLUTE_POSITION", "0".to_owned(), 0.0, 100_000.0)],
+            );
             let speed = self.speed.to_string();
             define("Number", "FOCUS_SPEED", &[("FOCUS_SPEED_VALUE", speed, 1.0, HIGHEST_SPEED)]);
             define("Switch", "FOCUS_ABORT_MOTION", &[("ABORT", switch(false), 0.0, 0.0)]);
+            let range = self.motor.range();
+            self.update_with("Ok", &format!(" min='{}' max='{}'", range.min().0, range.max().0), now, out);
         }
     }
 
     /// Updates look as servers write them: double quotes, one line.
     fn update(&self, state: &str, now: HostMicros, out: &mut String) {
+        self.update_with(state, "", now, out);
+    }
+
+    fn update_with(&self, state: &str, limits: &str, now: HostMicros, out: &mut String) {
         let position = self.position(now);
         writeln!(
             out,
             "<setNumberVector device=\"{DEVICE}\" name=\"ABS_FOCUS_POSITION\" state=\"{state}\"><oneNumber \
-             name=\"FOCUS_ABSOLUTE_POSITION\">\n{position}\n</oneNumber></setNumberVector>"
+             name=\"FOCUS_ABSOLUTE_POSITION\"{limits}>\n{position}\n</oneNumber></setNumberVector>"
         )
         .unwrap_or_default();
     }

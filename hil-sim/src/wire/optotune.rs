@@ -94,7 +94,7 @@ impl OptotuneModel {
             replies.extend(b"\r\n");
         };
         match name {
-            b"H" => say(&[b"B"]),
+            b"H" => say(&[b"HB"]),
             b"X" => say(&[b"XSIM00001"]),
             b"V" => say(&[b"V", &[1, 8, 0, 0, 0, 1]]),
             b"CrMA" => say(&[b"CMA", &29_284_u16.to_be_bytes()]),

@@ -97,6 +97,21 @@ impl Property {
     pub fn member(&self, name: &str) -> Option<&Member> {
         self.members.iter().find(|member| member.name == name)
     }
+
+    /// Takes the values of an update, and its limits where it has any: drivers learn a focuser's limits after they have defined
+    /// its position, and tell them so.
+    pub fn update(&mut self, members: Vec<Member>) {
+        for new in members {
+            if let Some(known) = self.members.iter_mut().find(|known| known.name == new.name) {
+                known.value = new.value;
+                for (limit, new) in [(&mut known.min, new.min), (&mut known.max, new.max)] {
+                    if !new.is_empty() {
+                        *limit = new;
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// A number, plain or sexagesimal (`-1:30`, `12 30 36`).

@@ -16,6 +16,8 @@ use crate::line::Line;
 const INTRODUCTION: Duration = Duration::from_secs(3);
 /// How long a device has to connect: drivers wait for controllers that boot.
 const CONNECTION: Duration = Duration::from_secs(10);
+/// How long a driver may take to ask the focuser where it is, once it is connected.
+const FIRST_UPDATE: Duration = Duration::from_secs(1);
 /// How long after a failure its reason may come.
 const EXPLANATION: Duration = Duration::from_millis(100);
 /// Properties of one device that are remembered.
@@ -90,8 +92,9 @@ impl Session {
             let millis = config.polling.as_millis().to_string();
             self.set(POLLING, Kind::Number, "PERIOD_MS", &millis)?;
         }
-        // Properties come one after the other; the rest of them is on its way.
-        let settled = self.line.now() + Duration::from_millis(200);
+        // A definition may come before the driver's first question to the focuser; the first update is true. The rest of the
+        // properties is on its way meanwhile.
+        let settled = self.line.now() + FIRST_UPDATE;
         while self.next(settled)?.is_some() && self.line.now() < settled {}
         if !self.properties.contains_key("FOCUS_ABORT_MOTION") && !config.without_abort {
             let what =
@@ -190,6 +193,8 @@ impl Session {
         }
         if property.is_definition && self.properties.len() < MOST_PROPERTIES {
             self.properties.insert(property.name.clone(), property);
+        } else if let Some(known) = self.properties.get_mut(&property.name) {
+            known.update(property.members);
         }
         is_position
     }

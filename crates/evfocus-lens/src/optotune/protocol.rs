@@ -24,7 +24,7 @@ pub fn checksum(message: &[u8]) -> u16 {
 /// What is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
-    /// `H`: the firmware's type, a letter.
+    /// `H`: the firmware's type, a letter after the `H`.
     FirmwareType,
     /// `X`: the lens's serial number, 8 characters.
     SerialNumber,

@@ -70,7 +70,7 @@ fn it_rests_within_two_counts_and_sweeps_at_the_speed_asked() {
 #[test]
 fn what_is_wrong_is_named_and_the_motor_cut_where_it_can_be() {
     for (fault, kind, words) in [
-        (WireFault::Silence, DeviceErrorKind::TimedOut, &["no answer to", "50ms"][..]),
+        (WireFault::Silence, DeviceErrorKind::TimedOut, &["no answer to", "30ms"][..]),
         (WireFault::Garbage, DeviceErrorKind::Protocol, &["not Modbus TCP"]),
         (WireFault::HalfReplies, DeviceErrorKind::Protocol, &["is no answer to"]),
         (WireFault::PositionJump(600.0), DeviceErrorKind::Fault, &["leapt"]),
