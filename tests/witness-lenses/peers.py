@@ -23,14 +23,21 @@ def check(what, holds, detail=""):
         sys.exit(1)
 
 
-def until(what, condition, patience=PATIENCE):
-    """Waits for `condition` to give something, and gives it."""
+def wait(condition, patience):
+    """Waits for `condition` to give something, and gives it; nothing if it does not in time."""
     end = time.monotonic() + patience
     while time.monotonic() < end:
         if (value := condition()) not in (None, False):
             return value
         time.sleep(0.02)
-    check(what, False, f"not within {patience} s")
+    return None
+
+
+def until(what, condition, patience=PATIENCE):
+    """Waits for `condition` to give something, and gives it; else the check has failed."""
+    if (value := wait(condition, patience)) is None:
+        check(what, False, f"not within {patience} s")
+    return value
 
 
 class Emulator:
@@ -48,8 +55,8 @@ class Emulator:
         for line in self.process.stdout:
             self.glass = float(line)
 
-    def stands(self):
-        """Where the glass is, once it has stood for a while."""
+    def stands(self, patience=PATIENCE):
+        """Where the glass is, once it has stood for a while; nothing if it does not in time."""
         seen = [None, time.monotonic()]
 
         def has_stood():
@@ -57,8 +64,7 @@ class Emulator:
                 seen[:] = [self.glass, time.monotonic()]
             return time.monotonic() - seen[1] > 0.5
 
-        until("the glass stands", has_stood)
-        return self.glass
+        return self.glass if wait(has_stood, patience) else None
 
     def __enter__(self):
         return self
