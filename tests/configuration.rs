@@ -68,7 +68,11 @@ fn mistakes_are_named_with_key_value_and_remedy() {
     refused("[focus]\ndepth_of_focus_counts = -1", &["line 2", "focus.depth_of_focus_counts", "-1", "3530"]);
     refused("[focus]\nextend_range = 1.5", &["line 2", "focus.extend_range", "1.5"]);
     refused("[focus]\ndirections = \"both\"", &["line 2", "directions"]);
-    refused("[lens]\nbackend = \"moonlite\"", &["lens.backend", "moonlite", "simulated"]);
+    refused(
+        "[lens]\nbackend = \"moonlight\"",
+        &["line 2", "lens.backend", "moonlight", "simulated", "moonlite"],
+    );
+    refused("[lens]\nport = \"/dev/ttyUSB0\"", &["line 2", "lens.port", "simulated"]);
     refused("[lens]\nmin_counts = 3000\nmax_counts = 300", &["lens.min_counts", "3000", "300"]);
     refused("[lens]\nmax_counts = 9999", &["lens.max_counts", "9999", "3750"]);
     refused("[simulation]\nscene = \"cat\"", &["simulation.scene", "cat", "dead-leaves"]);
@@ -100,6 +104,57 @@ fn mistakes_are_named_with_key_value_and_remedy() {
         &["simulation.faults.share", "lens-silent", "event-loss"],
     );
     refused("[daemon]\nsocket = \"\"", &["line 2", "daemon.socket"]);
+}
+
+/// A lens section for the driver `name`, with `keys` of its own.
+fn driver(name: &str, keys: &str) -> String {
+    format!("[lens]\nbackend = \"{name}\"\nmin_counts = 0\nmax_counts = 3000\n{keys}")
+}
+
+#[test]
+fn mistakes_about_lens_drivers_are_named() {
+    let moonlite = |keys: &str| driver("moonlite", keys);
+    refused(&moonlite(""), &["lens.port", "missing", "/dev/serial/by-id"]);
+    refused(&moonlite("address = \"10.0.0.5:99\""), &["line 5", "lens.address", "10.0.0.5:99", "lens.port"]);
+    refused("[lens]\nbackend = \"moonlite\"\nport = \"x\"", &["lens.min_counts", "missing", "moonlite"]);
+    refused(
+        "[lens]\nbackend = \"moonlite\"\nport = \"x\"\nmin_counts = -5\nmax_counts = 9",
+        &["line 4", "lens.min_counts", "-5", "16777215"],
+    );
+    refused(
+        &moonlite("port = \"x\"\n[lens.moonlite]\nmax_speed_counts_per_s = 0"),
+        &["line 7", "lens.moonlite.max_speed_counts_per_s", "0"],
+    );
+    refused(
+        &moonlite("port = \"x\"\n[lens.moonlite]\nsteps = \"quarter\""),
+        &["lens.moonlite.steps", "quarter", "half"],
+    );
+    refused(&driver("grbl", "port = \"x\"\n[lens.grbl]\naxis = \"A\""), &["lens.grbl.axis", "A", "X"]);
+    refused(
+        &driver("firmata", "port = \"x\"\npoll_ms = 50"),
+        &["line 6", "lens.poll_ms", "50", "steers", "at most 10"],
+    );
+    refused(
+        &driver("firmata", "port = \"x\"\n[lens.firmata]\ndirection_pin = 3"),
+        &["line 7", "lens.firmata.direction_pin", "another pin"],
+    );
+    refused(
+        &driver("labjack", "address = \"emulated\"\n[lens.drive]\ncounts_at_full = 2000"),
+        &["line 4", "lens.max_counts", "3000", "2000"],
+    );
+    refused(&driver("labjack", "address = \"10.0.0.5\""), &["line 5", "lens.address", "10.0.0.5", ":502"]);
+    refused(&driver("labjack", "port = \"/dev/ttyUSB0\""), &["line 5", "lens.port", "lens.address"]);
+    refused(
+        &driver("indi", "address = \"localhost:7624\""),
+        &["lens.indi.device", "missing", "indi_getprop"],
+    );
+    refused(
+        &driver("indi", "address = \"a:1\"\n[lens.indi]\ndevice = \"F\"\npolling_ms = 1"),
+        &["line 8", "lens.indi.polling_ms", "1", "10"],
+    );
+    let optotune = |keys: &str| driver("optotune", &format!("port = \"x\"\n[lens.optotune]\n{keys}"));
+    refused(&optotune("quantity = \"diopters\""), &["lens.optotune.quantity", "diopters", "focal-power"]);
+    refused(&optotune("damping = 1.5"), &["line 7", "lens.optotune.damping", "1.5", "0.99"]);
 }
 
 #[test]

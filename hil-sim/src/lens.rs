@@ -17,8 +17,9 @@ use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
 use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 pub use config::{LensConfig, LensKind};
+pub(crate) use profile::Spring;
 pub(crate) use state::LensState;
-use trajectory::Command;
+pub(crate) use trajectory::Command;
 
 /// How long a caller waits for a lens that has fallen silent.
 const REPLY_TIMEOUT: std::time::Duration = std::time::Duration::from_millis(50);

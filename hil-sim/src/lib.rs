@@ -21,6 +21,7 @@ mod random;
 mod rig;
 mod scene;
 mod sensor;
+pub mod wire;
 
 pub use camera::SimCamera;
 pub use config::{ConfigError, Flicker, LinkConfig, RigConfig};

@@ -12,6 +12,7 @@ use crate::lens::{LensState, SimLens, lock};
 use crate::picture::{Picture, Scratch};
 use crate::random::Stream;
 use crate::scene::Scene;
+use crate::wire::{Motor, Protocol, WirePort};
 
 /// A simulated rig. Clones are handles to the same rig.
 #[derive(Clone)]
@@ -56,6 +57,12 @@ impl Rig {
             Arc::clone(&self.capped),
         );
         (camera, SimLens::new(lens, clock, self.epoch, serial))
+    }
+
+    /// Puts a controller between the host and the lens, which the camera goes on to look through. It moves the same motor as
+    /// the lens of [`devices`](Self::devices); use one of the two.
+    pub fn wire(&self, protocol: Protocol) -> WirePort {
+        WirePort::new(protocol, Motor::new(Arc::clone(&self.lens), self.epoch), Arc::clone(&self.clock))
     }
 
     /// How the rig was configured.

@@ -1,6 +1,7 @@
 //! The configuration file: what users write, and what it means once it has been checked.
 
 mod focus;
+mod lens;
 mod simulation;
 mod value;
 
@@ -12,6 +13,10 @@ use evfocus_core::controller::{FocusRequest, Mode, Refusal};
 use serde::Deserialize;
 
 pub use focus::FocusSection;
+pub use lens::{
+    DriveSection, FirmataSection, GrblSection, IndiSection, LabJackSection, LensBackend, LensDriver,
+    LensPlace, LensSection, MoonLiteSection, OptotuneSection, SettingSection,
+};
 pub use simulation::{FaultSection, SimulationSection};
 pub(crate) use value::BadValue;
 
@@ -65,34 +70,6 @@ impl Default for CameraSection {
     }
 }
 
-/// `[lens]`
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LensSection {
-    /// `simulated`.
-    pub backend: String,
-    /// The lowest position the lens may be sent to, counts; absent: the lens's own.
-    pub min_counts: Option<f64>,
-    /// The highest; absent: the lens's own.
-    pub max_counts: Option<f64>,
-    /// How often the lens is asked where it is, milliseconds; 0.5 to 1000.
-    pub poll_ms: f64,
-    /// Play between what the lens reports and the glass, counts; 0 to 1e6.
-    pub backlash_counts: f64,
-}
-
-impl Default for LensSection {
-    fn default() -> Self {
-        Self {
-            backend: "simulated".to_owned(),
-            min_counts: None,
-            max_counts: None,
-            poll_ms: 2.0,
-            backlash_counts: 0.0,
-        }
-    }
-}
-
 /// The configuration, checked.
 #[derive(Debug, Clone)]
 pub struct Config {
@@ -104,6 +81,8 @@ pub struct Config {
     pub reports_kept: usize,
     /// The mode to start in.
     pub mode: Mode,
+    /// Which lens, and where.
+    pub lens: LensBackend,
     /// How often the lens is asked where it is.
     pub lens_poll: Duration,
     /// Play between what the lens reports and the glass, counts.
@@ -189,11 +168,9 @@ impl Config {
     }
 
     fn check(file: ConfigFile) -> Result<Self, BadValue> {
-        let backends = [("camera.backend", &file.camera.backend), ("lens.backend", &file.lens.backend)];
-        for (key, backend) in backends {
-            if backend != "simulated" {
-                return Err(BadValue::new(key, backend, "this version knows only \"simulated\""));
-            }
+        if file.camera.backend != "simulated" {
+            let remedy = "this version knows only \"simulated\"";
+            return Err(BadValue::new("camera.backend", file.camera.backend, remedy));
         }
         let mode = match file.daemon.mode.as_str() {
             "auto" => Mode::Auto,
@@ -202,21 +179,7 @@ impl Config {
         };
         let reports = f64::from(file.daemon.reports_kept);
         BadValue::check("daemon.reports_kept", reports, 1.0, 1e6)?;
-        let (min, max) = (file.lens.min_counts, file.lens.max_counts);
-        for (key, limit) in [("lens.min_counts", min), ("lens.max_counts", max)] {
-            if let Some(value) = limit.filter(|value| !value.is_finite()) {
-                return Err(BadValue::new(key, value, "it must be a number of lens counts"));
-            }
-        }
-        if let (Some(min), Some(max)) = (min, max)
-            && min >= max
-        {
-            return Err(BadValue::new(
-                "lens.min_counts",
-                min,
-                format!("it must lie below lens.max_counts, {max}"),
-            ));
-        }
+        let lens = file.lens.backend()?;
         for (key, path) in
             [("daemon.socket", &file.daemon.socket), ("daemon.state_dir", &file.daemon.state_dir)]
         {
@@ -231,18 +194,22 @@ impl Config {
             mode,
             lens_poll: BadValue::duration("lens.poll_ms", file.lens.poll_ms, 1e-3, 0.5, 1000.0)?,
             lens_backlash: BadValue::check("lens.backlash_counts", file.lens.backlash_counts, 0.0, 1e6)?,
-            lens_min: min.map(LensPosition),
-            lens_max: max.map(LensPosition),
-            rig: file.simulation.rig()?,
+            lens_min: file.lens.min_counts.map(LensPosition),
+            lens_max: file.lens.max_counts.map(LensPosition),
+            rig: file.simulation.rig(lens.emulated().as_ref())?,
+            lens,
             focus: file.focus,
         };
-        // Against the simulated lens, and the default run against both, now rather than at the first run.
-        let controller = config.controller(&hil_sim_lens(&config.rig))?;
-        FocusRequest::default().resolve(&controller, config.rig.sensor.geometry).map_err(|refusal| {
-            let is_interval = matches!(refusal, Refusal::Interval { .. });
-            let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
-            BadValue::new(key, "not fit for a default run", refusal.to_string())
-        })?;
+        // Against the lens, where it is known without asking it, and the default run against both: now rather than at the
+        // first run.
+        if let Some(lens) = config.lens.expected(&config.rig) {
+            let controller = config.controller(&lens)?;
+            FocusRequest::default().resolve(&controller, config.rig.sensor.geometry).map_err(|refusal| {
+                let is_interval = matches!(refusal, Refusal::Interval { .. });
+                let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
+                BadValue::new(key, "not fit for a default run", refusal.to_string())
+            })?;
+        }
         Ok(config)
     }
 
@@ -276,16 +243,6 @@ fn line_of(text: &str, key: &str) -> Option<usize> {
         let (left, _) = line.split_once('=')?;
         (here == section && left.trim() == name).then_some(index + 1)
     })
-}
-
-fn hil_sim_lens(rig: &hil_sim::RigConfig) -> evfocus_hal::LensInfo {
-    evfocus_hal::LensInfo {
-        model: String::new(),
-        serial: String::new(),
-        range: rig.lens.range,
-        max_speed: rig.lens.max_speed,
-        needs_homing: rig.lens.needs_homing,
-    }
 }
 
 /// `$EVFOCUS_SOCKET`, else `evfocus/socket` in `$XDG_RUNTIME_DIR`, else `/run/evfocus/socket`. Daemon and command line agree on it.

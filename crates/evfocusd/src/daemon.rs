@@ -14,7 +14,7 @@ use evfocus_ipc::{self as ipc, Device, DeviceRole, DeviceState, Error, Report, S
 use rtrb::RingBuffer;
 use tokio::sync::{broadcast, mpsc, watch};
 
-use crate::config::Config;
+use crate::config::{Config, LensBackend};
 use crate::devices::{self, Devices};
 use crate::handle::{Handle, Lookups};
 use crate::publisher::{Constants, PROGRESS, Publisher, Reports};
@@ -54,6 +54,9 @@ pub async fn run(
         tracing::warn!(
             "the simulated IMX636 is several times slower than real time, so runs will time out; use davis346 here"
         );
+    }
+    if config.lens.is_hardware() {
+        tracing::warn!("the simulated camera does not look through this lens; it serves to try the lens");
     }
     let mut running = Running::start(&config, devices, &clock)?;
     let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());
@@ -96,7 +99,6 @@ impl Running {
         let mut settings = config
             .controller(&lens_info)
             .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
-        let limits = settings.limits;
         let store = Reports::new(ReportStore::open(&config.state_dir, config.reports_kept));
         if let Some(fault) = store.fault() {
             tracing::error!(%fault, "reports are kept in memory only");
@@ -106,7 +108,7 @@ impl Running {
         let rig_delay = (store.fault().is_none())
             .then(|| RigDelayFile::new(&config.state_dir, &run_devices.camera, &run_devices.lens));
         settings.delays = rig_delay.as_ref().and_then(RigDelayFile::read).unwrap_or_default();
-        let (saved_delays, pace) = (settings.delays, settings.pace);
+        let (saved_delays, pace, limits) = (settings.delays, settings.pace, settings.limits);
         let mut controller = Controller::new(settings, camera_info.geometry, clock.now());
         controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
         if config.mode == Mode::Manual {
@@ -169,6 +171,7 @@ impl Running {
         let lookups = DaemonLookups {
             camera: camera_info,
             lens: lens_info,
+            backend: config.lens.clone(),
             reports: store.clone(),
             status: status_out.clone(),
         };
@@ -269,6 +272,7 @@ fn spawn(
 struct DaemonLookups {
     camera: CameraInfo,
     lens: LensInfo,
+    backend: LensBackend,
     reports: Reports,
     status: watch::Receiver<Arc<Status>>,
 }
@@ -276,19 +280,30 @@ struct DaemonLookups {
 impl Lookups for DaemonLookups {
     fn devices(&self) -> Result<Vec<Device>, Error> {
         let status = Arc::clone(&self.status.borrow());
-        let device = |role, model: &str, serial: &str, is_there: bool| Device {
-            role,
-            driver: "simulated".to_owned(),
-            model: model.to_owned(),
-            serial: serial.to_owned(),
-            location: "simulated".to_owned(),
-            state: if is_there { DeviceState::Active } else { DeviceState::Missing },
-            message: if is_there { None } else { status.fault.clone() },
-        };
-        Ok(vec![
-            device(DeviceRole::Camera, &self.camera.model, &self.camera.serial, status.camera.is_some()),
-            device(DeviceRole::Lens, &self.lens.model, &self.lens.serial, status.lens.is_some()),
-        ])
+        let device =
+            |role, (driver, location): (&str, &str), model: &str, serial: &str, is_there: bool| Device {
+                role,
+                driver: driver.to_owned(),
+                model: model.to_owned(),
+                serial: serial.to_owned(),
+                location: location.to_owned(),
+                state: if is_there { DeviceState::Active } else { DeviceState::Missing },
+                message: if is_there { None } else { status.fault.clone() },
+            };
+        let simulated = ("simulated", "simulated");
+        let lens = (self.backend.name(), self.backend.location());
+        let mut devices = vec![
+            device(
+                DeviceRole::Camera,
+                simulated,
+                &self.camera.model,
+                &self.camera.serial,
+                status.camera.is_some(),
+            ),
+            device(DeviceRole::Lens, lens, &self.lens.model, &self.lens.serial, status.lens.is_some()),
+        ];
+        devices.extend(devices::free_ports(self.backend.location()));
+        Ok(devices)
     }
 
     fn report(&self, id: Option<u64>) -> Result<Report, Error> {

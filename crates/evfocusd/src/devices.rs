@@ -1,11 +1,15 @@
 //! What the focus loop needs of its devices beyond the traits: opening them, and telling their failures apart.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use evfocus_core::controller::{Action, DeviceFailure};
 use evfocus_hal::{Camera, Clock, DeviceError, DeviceErrorKind, Lens};
+use evfocus_ipc::{Device, DeviceRole, DeviceState};
+use evfocus_lens::{Firmata, Grbl, Indi, LabJack, MoonLite, Optotune, Port, UsbPort};
+use rustix::fs::Access;
 
-use crate::config::Config;
+use crate::config::{Config, LensBackend, LensDriver, LensPlace};
 
 /// A camera and a lens that belong together.
 pub struct Devices {
@@ -25,15 +29,73 @@ impl std::fmt::Debug for Devices {
 }
 
 impl Devices {
-    /// Opens the devices that `config` names; simulated ones live on `clock`.
+    /// Opens the devices that `config` names; simulated and emulated ones live on `clock`.
     ///
     /// # Errors
-    /// [`hil_sim::ConfigError`] if the simulated rig makes no sense.
-    pub fn open(config: &Config, clock: &Arc<dyn Clock>) -> Result<Self, hil_sim::ConfigError> {
+    /// [`OpenError`], with what to do about it.
+    pub fn open(config: &Config, clock: &Arc<dyn Clock>) -> Result<Self, OpenError> {
         let rig = hil_sim::Rig::new(config.rig.clone(), Arc::clone(clock))?;
-        let (camera, lens) = rig.devices();
-        Ok(Self { camera: Box::new(camera), lens: Box::new(lens) })
+        let (camera, _) = rig.devices();
+        Ok(Self { camera: Box::new(camera), lens: open_lens(&config.lens, &rig, clock)? })
     }
+}
+
+/// What keeps a device from being opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The simulated rig makes no sense.
+    #[error(transparent)]
+    Rig(#[from] hil_sim::ConfigError),
+    /// The device does not open.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+}
+
+/// Opens the lens that `backend` names: that of `rig`, the rig's behind an emulated controller, or a real one.
+pub(crate) fn open_lens(
+    backend: &LensBackend,
+    rig: &hil_sim::Rig,
+    clock: &Arc<dyn Clock>,
+) -> Result<Box<dyn Lens>, DeviceError> {
+    let LensBackend::Driver { driver, place } = backend else { return Ok(Box::new(rig.devices().1)) };
+    let port = match place {
+        LensPlace::Emulated => {
+            let wire = rig.wire(driver.protocol());
+            Port::new("emulated", Box::new(move || wire.open()))
+        }
+        LensPlace::Serial { path, baud } => Port::serial(path, *baud, Arc::clone(clock)),
+        LensPlace::Tcp(address) => Port::tcp(address, Arc::clone(clock)),
+    };
+    let clock = Arc::clone(clock);
+    Ok(match driver {
+        LensDriver::MoonLite(config) => Box::new(MoonLite::open(port, *config, clock)?),
+        LensDriver::Optotune(config) => Box::new(Optotune::open(port, *config, clock)?),
+        LensDriver::Grbl(config) => Box::new(Grbl::open(port, *config, clock)?),
+        LensDriver::Firmata(config) => Box::new(Firmata::open(port, *config, clock)?),
+        LensDriver::LabJack(config) => Box::new(LabJack::open(port, *config, clock)?),
+        LensDriver::Indi(config) => Box::new(Indi::open(port, config.clone(), clock)?),
+    })
+}
+
+/// The serial ports on USB that a lens could be attached to, besides the one that is used.
+pub(crate) fn free_ports(used: &str) -> Vec<Device> {
+    let used = std::fs::canonicalize(used).unwrap_or_default();
+    let free = evfocus_lens::usb_ports().into_iter().filter(|port| Path::new(&port.path) != used);
+    let devices = free.map(|UsbPort { path, product, serial }| {
+        let may = rustix::fs::access(&path, Access::READ_OK | Access::WRITE_OK).is_ok();
+        let remedy =
+            "let the user that evfocusd runs as into the group that owns the port, dialout on Debian";
+        Device {
+            role: DeviceRole::Lens,
+            driver: "serial port".to_owned(),
+            model: product,
+            serial,
+            location: path,
+            state: if may { DeviceState::Available } else { DeviceState::PermissionDenied },
+            message: (!may).then(|| remedy.to_owned()),
+        }
+    });
+    devices.collect()
 }
 
 /// Model and serial, as reports name a device.

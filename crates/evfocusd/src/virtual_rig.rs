@@ -40,7 +40,7 @@ pub struct VirtualRig {
     clock: Arc<VirtualClock>,
     rig: hil_sim::Rig,
     camera: hil_sim::SimCamera,
-    lens: hil_sim::SimLens,
+    lens: Box<dyn Lens>,
     controller: Controller,
     batch: EventBatch,
     actions: Vec<Action>,
@@ -64,7 +64,9 @@ impl VirtualRig {
     pub fn new(config: &Config) -> Result<Self, VirtualRigError> {
         let clock = Arc::new(VirtualClock::new());
         let rig = hil_sim::Rig::new(config.rig.clone(), clock.clone())?;
-        let (mut camera, lens) = rig.devices();
+        let (mut camera, _) = rig.devices();
+        let shared: Arc<dyn Clock> = clock.clone();
+        let lens = devices::open_lens(&config.lens, &rig, &shared)?;
         camera.start()?;
         let settings =
             config.controller(&lens.info()).map_err(|bad| VirtualRigError::Settings(bad.to_string()))?;
@@ -169,7 +171,7 @@ impl VirtualRig {
             if self.lens_failed {
                 continue;
             }
-            if let Err(error) = devices::perform(action, &mut self.lens) {
+            if let Err(error) = devices::perform(action, self.lens.as_mut()) {
                 self.fail_lens(&error);
             }
         }

@@ -1,25 +1,71 @@
-//! Motor positions against time as stretches of constant acceleration, known in closed form for any time.
+//! Motor positions against time as stretches that are known in closed form for any time.
 
-/// A stretch of constant acceleration in which the motor does not turn round.
+/// What drives the motor during a phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Course {
+    /// Constant acceleration, counts per second squared; the motor does not turn round.
+    Accelerated(f64),
+    /// A spring that pulls to its rest: glass without a motor, as in a liquid lens.
+    Sprung(Spring),
+}
+
+/// A damped spring, below critical damping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spring {
+    /// Where it comes to rest, counts.
+    pub(crate) rest: f64,
+    /// Undamped, cycles per second.
+    pub(crate) natural_hz: f64,
+    /// Share of the critical damping; above 0, below 1.
+    pub(crate) damping: f64,
+}
+
+impl Spring {
+    /// Position and velocity `seconds` after it was let go at `position` with `velocity`.
+    fn after(&self, position: f64, velocity: f64, seconds: f64) -> (f64, f64) {
+        let natural = std::f64::consts::TAU * self.natural_hz;
+        let (decay, omega) = (self.damping * natural, natural * (1.0 - self.damping * self.damping).sqrt());
+        let along = position - self.rest;
+        let across = (velocity + decay * along) / omega;
+        let (sin, cos) = (omega * seconds).sin_cos();
+        let envelope = (-decay * seconds).exp();
+        let offset = envelope * (along * cos + across * sin);
+        (self.rest + offset, envelope * omega * (across * cos - along * sin) - decay * offset)
+    }
+
+    /// By then what is left of a step is below a hundred-thousandth of it.
+    fn settling(&self) -> f64 {
+        12.0 / (self.damping * std::f64::consts::TAU * self.natural_hz)
+    }
+}
+
+/// A stretch of the motor's way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Phase {
     /// Counts at its start.
     pub(super) position: f64,
     /// Counts per second at its start.
     pub(super) velocity: f64,
-    /// Counts per second squared.
-    pub(super) acceleration: f64,
+    pub(super) course: Course,
     /// Seconds.
     pub(super) duration: f64,
 }
 
 impl Phase {
     pub(super) fn position_after(&self, seconds: f64) -> f64 {
-        self.position + seconds * (self.velocity + 0.5 * self.acceleration * seconds)
+        match self.course {
+            Course::Accelerated(acceleration) => {
+                self.position + seconds * (self.velocity + 0.5 * acceleration * seconds)
+            }
+            Course::Sprung(spring) => spring.after(self.position, self.velocity, seconds).0,
+        }
     }
 
     pub(super) fn velocity_after(&self, seconds: f64) -> f64 {
-        self.velocity + self.acceleration * seconds
+        match self.course {
+            Course::Accelerated(acceleration) => self.velocity + acceleration * seconds,
+            Course::Sprung(spring) => spring.after(self.position, self.velocity, seconds).1,
+        }
     }
 
     pub(super) fn end(&self) -> f64 {
@@ -39,6 +85,11 @@ pub(super) struct Limits {
 /// Brings the motor from `position` and `velocity` to rest.
 pub(super) fn brake(phases: &mut Vec<Phase>, position: f64, velocity: f64, acceleration: f64) -> f64 {
     push(phases, position, velocity, -acceleration.copysign(velocity), velocity.abs() / acceleration)
+}
+
+/// Lets the glass swing to where `spring` rests.
+pub(super) fn swing(phases: &mut Vec<Phase>, position: f64, velocity: f64, spring: Spring) {
+    phases.push(Phase { position, velocity, course: Course::Sprung(spring), duration: spring.settling() });
 }
 
 /// A trapezoid of speed from `position` and `velocity` to rest at `target`. Returns where it ends: `target`, up to rounding.
@@ -77,7 +128,7 @@ pub(super) fn travel(
 fn push(phases: &mut Vec<Phase>, position: f64, velocity: f64, acceleration: f64, duration: f64) -> f64 {
     // The NaN of a motor at rest that is told to stay where it is (0 / 0) is not above zero either.
     if duration > 0.0 {
-        let phase = Phase { position, velocity, acceleration, duration };
+        let phase = Phase { position, velocity, course: Course::Accelerated(acceleration), duration };
         phases.push(phase);
         phase.end()
     } else {

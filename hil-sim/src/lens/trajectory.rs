@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::config::LensConfig;
-use super::profile::{Limits, Phase, brake, travel};
+use super::profile::{Limits, Phase, Spring, brake, swing, travel};
 use super::warp::Warp;
 
 /// Motions that are kept: the sensor may lag behind the lens by this many commands.
@@ -48,6 +48,8 @@ pub(crate) enum Command {
     },
     /// Stop.
     Brake,
+    /// Let go on a spring; play and overshoot of a motor do not apply.
+    Swing(Spring),
 }
 
 /// All motions of a lens.
@@ -96,6 +98,7 @@ impl Trajectory {
             Command::Brake => {
                 brake(&mut phases, from.motor, from.velocity, self.acceleration);
             }
+            Command::Swing(spring) => swing(&mut phases, from.motor, from.velocity, spring),
             Command::Travel { target, speed } => {
                 let limits = Limits { speed, acceleration: self.acceleration };
                 let beyond = (target + self.overshoot.copysign(target - from.motor))

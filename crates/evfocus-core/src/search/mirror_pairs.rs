@@ -214,7 +214,8 @@ mod tests {
     fn a_broken_pixel_leaves_the_levels_and_comes_back() {
         let mut pixel = Pixel::UNTOUCHED;
         let step = TravelStep(10);
-        let closed = |pixel: &mut Pixel, is_on| (0..1000).filter(|_| pixel.take(is_on, step).is_some()).count();
+        let closed =
+            |pixel: &mut Pixel, is_on| (0..1000).filter(|_| pixel.take(is_on, step).is_some()).count();
         assert_eq!(closed(&mut pixel, true), 0);
         // The levels that it passed on its way up, and none of those beyond.
         assert_eq!(closed(&mut pixel, false), usize::try_from(LEVELS).unwrap());

@@ -86,7 +86,8 @@ fn a_session_with_the_daemon() {
     let daemon = Daemon::start();
     let status = daemon.json(&["status", "--json"]);
     assert_eq!((&status["mode"], &status["state"]), (&"auto".into(), &"idle".into()));
-    assert_eq!(daemon.json(&["devices", "--json"]).as_array().map(Vec::len), Some(2));
+    // And the serial ports of this machine, if it has any.
+    assert!(daemon.json(&["devices", "--json"]).as_array().is_some_and(|devices| devices.len() >= 2));
     for command in ["status", "devices"] {
         assert!(stdout(&daemon.run(&[command])).contains("simulated"), "{command}");
     }

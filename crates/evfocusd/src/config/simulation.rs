@@ -4,6 +4,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use evfocus_core::LensPosition;
+use evfocus_hal::LensInfo;
 use hil_sim::{
     CameraModel, Fault, FaultKind, FaultTrigger, Flicker, LensConfig, Light, MotionConfig, RigConfig, Scene,
 };
@@ -94,8 +95,8 @@ fn named<T: FromStr<Err = hil_sim::NameError>>(key: &str, name: &str) -> Result<
 }
 
 impl SimulationSection {
-    /// The rig that the section describes.
-    pub(super) fn rig(&self) -> Result<RigConfig, BadValue> {
+    /// The rig that the section describes, with the range and the speed of the `emulated` lens if there is one.
+    pub(super) fn rig(&self, emulated: Option<&LensInfo>) -> Result<RigConfig, BadValue> {
         let camera: CameraModel = named("simulation.camera", &self.camera)?;
         let light: Light = named("simulation.light", &self.light)?;
         let mut rig = RigConfig::preset(camera, light);
@@ -107,6 +108,10 @@ impl SimulationSection {
             "worn" => LensConfig::worn(),
             other => return Err(BadValue::new("simulation.lens", other, "choose one of: good, worn")),
         };
+        if let Some(lens) = emulated {
+            (rig.lens.range, rig.lens.max_speed) = (lens.range, lens.max_speed);
+            rig.lens.start = lens.range.min();
+        }
         rig.motion = MotionConfig {
             shake_px_rms: self.shake_px_rms,
             // A hand that shakes by 2 px rolls by 3 mrad.
