@@ -243,6 +243,7 @@ fn what_the_rig_cannot_do_ends_with_its_named_reason() -> Result<()> {
         ("peak-at-edge", config("[simulation]\nfocus_counts = 235\nvelocity_px_per_s = 60")?),
         ("saturated", saturated()?),
         ("flicker", flickering()?),
+        ("weak", config("[simulation]\nscene = \"low-texture\"\nlight = \"dark\"")?),
         ("flat", config("[simulation]\nscene = \"blank-wall\"\nlight = \"dark\"")?),
     ];
     for (expected, config) in cases {

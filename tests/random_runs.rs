@@ -2,7 +2,7 @@
 //! sure of it, none fails for a reason that misleads.
 
 use anyhow::Result;
-use evfocus_tests::random_runs::{Verdict, run_all};
+use evfocus_tests::random_runs::{Trial, Verdict, run_all};
 
 #[test]
 fn random_runs_end_in_focus_or_with_the_right_reason() -> Result<()> {
@@ -19,5 +19,13 @@ fn random_runs_end_in_focus_or_with_the_right_reason() -> Result<()> {
     }
     let focused = runs.iter().filter(|(_, trial, ended)| ended.verdict(trial) == Verdict::Focused).count();
     assert!(focused >= 6, "{focused} of 16 focused");
+    Ok(())
+}
+
+/// Fronts of houses that go by: what is at one height is sharp in other bins than what is at another, because they pass in turns.
+#[test]
+fn readings_that_contradict_each_other_are_unsure() -> Result<()> {
+    let ended = Trial::draw(122)?.run()?;
+    assert_eq!(ended.reason(), "unsure");
     Ok(())
 }

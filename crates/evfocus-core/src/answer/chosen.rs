@@ -33,6 +33,7 @@ impl Chosen {
         flags.set(Flag::Coarse, structure.is_coarse);
         flags.set(Flag::Weak, structure.significance < LEAST_SIGNIFICANCE);
         if is_at_edge(structure.position, rules.range, rules.edge_share) {
+            structure.significant().map_err(Failure::of_search)?;
             return Err(Failure::PeakAtEdge { position: structure.position });
         }
         Ok(Self { structure, position, second_depth, window, flags })

@@ -82,9 +82,13 @@ impl StructureMeasure {
             Reading { filter: Filter::Horizontal, ..usual },
             Reading { filter: Filter::Vertical, ..usual },
             Reading { top: 0.7, ..usual },
+            // The same as the usual one, unless that compares with the end.
+            Reading { reference: usual.reference / 2.0, ..usual },
         ];
+        // Near the start the picture there is no reference, not even by half.
+        let others = if apex.at < apex.width { others.get(..4) } else { others.get(..) }.unwrap_or_default();
         let (mut squares, mut number) = (0.0, 0.0_f64);
-        for other in others {
+        for &other in others.iter().filter(|&&other| other != usual) {
             // A picture of stripes has no structure along them, and what chance puts there says nothing.
             if let Some(other) =
                 self.read(other).filter(|other| other.significance >= LEAST_TILE_SIGNIFICANCE)
