@@ -6,10 +6,11 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use evfocus_core::Outcome;
 use evfocus_core::controller::FocusRequest;
+use evfocus_core::{LensPosition, Outcome};
 use evfocusd::config::LensBackend;
 use evfocusd::{Config, VirtualRig};
+use hil_sim::{Fault, FaultKind, FaultTrigger};
 
 /// Mean errors below this are good enough, whatever the plain lens does: a blur of one pixel is 50 counts here.
 const GOOD_ENOUGH: f64 = 1.0;
@@ -51,53 +52,92 @@ fn compare(name: &str, section: &str) -> Result<()> {
     Ok(())
 }
 
+/// Each driver before the model of its device.
+const MOONLITE: &str =
+    "backend = \"moonlite\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 1
+    [lens.moonlite]\nmax_speed_counts_per_s = 1000";
+const OPTOTUNE: &str = "backend = \"optotune\"\nport = \"emulated\"\npoll_ms = 1
+    [lens.optotune]\nmax_speed_counts_per_s = 1765";
+const GRBL: &str =
+    "backend = \"grbl\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 20";
+const FIRMATA: &str =
+    "backend = \"firmata\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 2";
+const LABJACK: &str =
+    "backend = \"labjack\"\naddress = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 2";
+const INDI: &str = "backend = \"indi\"\naddress = \"emulated\"\npoll_ms = 2
+    [lens.indi]\ndevice = \"Focuser\"\nmax_speed_counts_per_s = 1765";
+
 #[test]
 fn moonlite_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare(
-        "moonlite",
-        "backend = \"moonlite\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 1
-         [lens.moonlite]\nmax_speed_counts_per_s = 1000",
-    )
+    compare("moonlite", MOONLITE)
 }
 
 #[test]
 fn optotune_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare(
-        "optotune",
-        "backend = \"optotune\"\nport = \"emulated\"\npoll_ms = 1
-         [lens.optotune]\nmax_speed_counts_per_s = 1765",
-    )
+    compare("optotune", OPTOTUNE)
 }
 
 #[test]
 fn grbl_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare(
-        "grbl",
-        "backend = \"grbl\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 20",
-    )
+    compare("grbl", GRBL)
 }
 
 #[test]
 fn firmata_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare(
-        "firmata",
-        "backend = \"firmata\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 2",
-    )
+    compare("firmata", FIRMATA)
 }
 
 #[test]
 fn labjack_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare(
-        "labjack",
-        "backend = \"labjack\"\naddress = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 2",
-    )
+    compare("labjack", LABJACK)
 }
 
 #[test]
 fn indi_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare(
-        "indi",
-        "backend = \"indi\"\naddress = \"emulated\"\npoll_ms = 2
-         [lens.indi]\ndevice = \"Focuser\"\nmax_speed_counts_per_s = 1765",
-    )
+    compare("indi", INDI)
+}
+
+/// A run in which `kind` strikes in the middle of the first sweep: the reason that it gives, and how far the glass went on.
+fn fail(section: &str, kind: FaultKind) -> Result<(&'static str, f64)> {
+    let mut config = config(section, 1)?;
+    let struck = LensPosition(1500.0);
+    config.rig.faults = vec![Fault { kind, trigger: FaultTrigger::AtPosition(struck) }];
+    let mut rig = VirtualRig::new(&config)?;
+    let report = rig.focus(FocusRequest::default(), |_, _, _| {})?;
+    let reason = match report.outcome {
+        Outcome::Failed(failure) => failure.name(),
+        Outcome::Focused { .. } => "focused",
+        Outcome::Aborted => "aborted",
+    };
+    Ok((reason, rig.rig().glass(rig.now()).distance(struck)))
+}
+
+#[test]
+fn a_cable_pulled_in_mid_sweep_is_a_lost_lens() -> Result<()> {
+    for section in [MOONLITE, OPTOTUNE, GRBL, FIRMATA, LABJACK, INDI] {
+        assert_eq!(fail(section, FaultKind::LensUnplugged)?.0, "lens-lost", "{section}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_lens_that_falls_silent_in_mid_sweep_is_named() -> Result<()> {
+    for section in [MOONLITE, OPTOTUNE, GRBL, FIRMATA, LABJACK] {
+        let (reason, further) = fail(section, FaultKind::LensSilent)?;
+        println!("{section}: {reason}, {further:.0} counts further");
+        assert_eq!(reason, "lens-silent", "{section}");
+    }
+    // A server that says nothing of a motion is one whose focuser does not move.
+    assert_eq!(fail(INDI, FaultKind::LensSilent)?.0, "lens-stopped-short");
+    Ok(())
+}
+
+#[test]
+fn a_lens_that_sticks_in_mid_sweep_does_not_focus() -> Result<()> {
+    for section in [MOONLITE, OPTOTUNE, GRBL, FIRMATA, LABJACK, INDI] {
+        let (reason, further) = fail(section, FaultKind::LensStalled)?;
+        println!("{section}: {reason}, {further:.0} counts further");
+        assert!(!["focused", "aborted"].contains(&reason), "{section}: {reason}");
+    }
+    Ok(())
 }

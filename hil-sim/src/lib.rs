@@ -4,6 +4,8 @@
 //! that differ, noise, leak and a limited read-out; thin-lens blur; a motor with backlash, ripple and stick-slip; shake,
 //! moving scenes, flicker; and faults on schedule. Everything follows from one seed.
 //!
+//! [`wire`] puts lens controllers in front of the lens as they are on the wire: bytes in, bytes out.
+//!
 //! Not its job: knowing anything of the focus loop. What the simulator knows and a real rig does not tell
 //! ([`Rig::truth`]) never passes through the traits.
 
