@@ -1,75 +1,54 @@
 //! EVT 3.0: 16-bit words, little-endian, the type in bits 15 to 12 (Prophesee, "EVT 3.0 Format"; rules for time and for
 //! damaged streams as in OpenEB's decoder, `hal/cpp/include/metavision/hal/decoders/evt3`).
 
-use evfocus_core::{CameraMicros, Event, EventBatch, Geometry, Polarity};
+mod counter;
+mod time;
 
+pub use counter::Evt3Counter;
+
+use alloc::vec::Vec;
+
+use super::TimeRule;
 use super::framing::Framing;
-use crate::Damage;
+use crate::damage::Damage;
+use crate::event::{Event, EventBatch, Geometry, Polarity};
+use crate::units::CameraMicros;
+use time::Evt3Time;
 
 /// The type of a word, bits 15 to 12.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum WordType {
+pub mod word_type {
     /// Row of the events that follow, bits 10 to 0.
-    AddrY,
+    pub const ADDR_Y: u16 = 0x0;
     /// One event: column in bits 10 to 0, polarity in bit 11.
-    AddrX,
+    pub const ADDR_X: u16 = 0x2;
     /// Column and polarity of the vectors that follow.
-    VectBaseX,
+    pub const VECT_BASE_X: u16 = 0x3;
     /// Twelve pixels from the base on, one bit each.
-    Vect12,
+    pub const VECT_12: u16 = 0x4;
     /// Eight pixels from the base on, one bit each.
-    Vect8,
+    pub const VECT_8: u16 = 0x5;
     /// Time bits 11 to 0.
-    TimeLow,
+    pub const TIME_LOW: u16 = 0x6;
+    /// Four more bits of the word before.
+    pub const CONTINUED_4: u16 = 0x7;
     /// Time bits 23 to 12.
-    TimeHigh,
-    /// Edge at an external input.
-    ExtTrigger,
-    /// Four, or twelve, more bits of the word before; statistics and other words without events.
-    NoEvents,
-    /// Not defined.
-    Unknown,
-}
-
-impl WordType {
-    pub(crate) const ADDR_Y: u16 = 0x0;
-    pub(crate) const ADDR_X: u16 = 0x2;
-    pub(crate) const VECT_BASE_X: u16 = 0x3;
-    pub(crate) const VECT_12: u16 = 0x4;
-    pub(crate) const VECT_8: u16 = 0x5;
-    pub(crate) const TIME_LOW: u16 = 0x6;
-    const CONTINUED_4: u16 = 0x7;
-    pub(crate) const TIME_HIGH: u16 = 0x8;
-    const EXT_TRIGGER: u16 = 0xA;
-    const OTHERS: u16 = 0xE;
-    const CONTINUED_12: u16 = 0xF;
-
-    fn of(word: u16) -> Self {
-        match word >> 12 {
-            Self::ADDR_Y => Self::AddrY,
-            Self::ADDR_X => Self::AddrX,
-            Self::VECT_BASE_X => Self::VectBaseX,
-            Self::VECT_12 => Self::Vect12,
-            Self::VECT_8 => Self::Vect8,
-            Self::TIME_LOW => Self::TimeLow,
-            Self::TIME_HIGH => Self::TimeHigh,
-            Self::EXT_TRIGGER => Self::ExtTrigger,
-            Self::CONTINUED_4 | Self::OTHERS | Self::CONTINUED_12 => Self::NoEvents,
-            _ => Self::Unknown,
-        }
-    }
+    pub const TIME_HIGH: u16 = 0x8;
+    /// Edge at an external input: value in bit 0, channel in bits 11 to 8.
+    pub const EXT_TRIGGER: u16 = 0xA;
+    /// Statistics and other words without events.
+    pub const OTHERS: u16 = 0xE;
+    /// Twelve more bits of the word before.
+    pub const CONTINUED_12: u16 = 0xF;
 }
 
 /// Bits 10 to 0: a row or column.
 const ADDRESS_MASK: u16 = 0x7FF;
 /// Bit 11 of a column word: brighter.
-pub(crate) const POLARITY_BIT: u16 = 0x800;
+pub const POLARITY_BIT: u16 = 0x800;
 /// Bits 11 to 0: the payload of most words.
 const PAYLOAD_MASK: u16 = 0xFFF;
 /// Microseconds until the 24 bits of time wrap.
-pub(crate) const TIME_PERIOD_US: i64 = 1 << 24;
-/// A coarse time that falls by at least half its period has wrapped; by less, it has gone back (OpenEB's rule).
-const WRAP_THRESHOLD: i32 = 2048;
+pub const TIME_PERIOD_US: i64 = 1 << 24;
 
 /// Decodes EVT 3.0 words into events.
 ///
@@ -84,12 +63,8 @@ pub struct Evt3Decoder {
 #[derive(Debug, Clone)]
 struct State {
     geometry: Geometry,
-    /// Time of the last time word, `None` before the first TIME_HIGH.
-    time: Option<i64>,
-    /// Added to the camera's 24 bits: the origin, and a period for each wrap.
-    period_start: i64,
-    high: u16,
-    /// Row of the events that follow, `None` before the first and after one that the sensor does not have.
+    time: Evt3Time,
+    /// Row of the events that follow.
     row: Row,
     /// Column of the next vector's first pixel.
     base: Option<u16>,
@@ -111,18 +86,25 @@ impl Evt3Decoder {
     /// What the format can address: 11 bits each way. For streams whose sensor is unknown.
     pub const MAX_GEOMETRY: Geometry = Geometry { width: 2048, height: 2048 };
 
-    /// A decoder for a sensor of this size.
+    /// A decoder for a recording from a sensor of this size: time as sent.
     pub fn new(geometry: Geometry) -> Self {
         Self::with_origin(geometry, CameraMicros(0))
     }
 
+    /// A decoder for a live camera with a sensor of this size: time never goes back.
+    pub fn live(geometry: Geometry) -> Self {
+        Self::with_time(geometry, Evt3Time::new(TimeRule::Ascending, 0))
+    }
+
     /// As [`new`](Self::new), with `origin` added to all times.
     pub fn with_origin(geometry: Geometry, origin: CameraMicros) -> Self {
+        Self::with_time(geometry, Evt3Time::new(TimeRule::AsSent, origin.0))
+    }
+
+    fn with_time(geometry: Geometry, time: Evt3Time) -> Self {
         let state = State {
             geometry,
-            time: None,
-            period_start: origin.0,
-            high: 0,
+            time,
             row: Row::None,
             base: None,
             polarity: Polarity::Off,
@@ -140,7 +122,7 @@ impl Evt3Decoder {
         let dropped = state.damage.events_before_address + state.damage.outside_sensor;
         self.framing.feed(bytes, |word| state.word(u16::from_le_bytes(word), &mut batch.events));
         batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
-        batch.reached = state.time.map(CameraMicros).or(batch.reached);
+        batch.reached = state.time.now().map(CameraMicros).or(batch.reached);
     }
 
     /// Says that the stream has ended, so that a partial word counts as damage.
@@ -150,7 +132,8 @@ impl Evt3Decoder {
 
     /// What was found wrong so far.
     pub fn damage(&self) -> Damage {
-        self.state.damage
+        let time = &self.state.time;
+        Damage { time_jumps: time.jumps, timestamp_resets: time.restarts, ..self.state.damage }
     }
 
     /// Edges at the external inputs so far.
@@ -161,52 +144,21 @@ impl Evt3Decoder {
 
 impl State {
     fn word(&mut self, word: u16, events: &mut Vec<Event>) {
-        match WordType::of(word) {
-            WordType::AddrX => self.single(word, events),
-            WordType::TimeLow => self.time_low(word & PAYLOAD_MASK),
-            WordType::AddrY => self.row(word & ADDRESS_MASK),
-            WordType::TimeHigh => self.time_high(word & PAYLOAD_MASK),
-            WordType::VectBaseX => {
+        match word >> 12 {
+            word_type::ADDR_X => self.single(word, events),
+            word_type::TIME_LOW => self.time.low(word & PAYLOAD_MASK),
+            word_type::ADDR_Y => self.row(word & ADDRESS_MASK),
+            word_type::TIME_HIGH => self.time.high(word & PAYLOAD_MASK),
+            word_type::VECT_BASE_X => {
                 self.base = Some(word & ADDRESS_MASK);
                 self.polarity = Polarity::from_on(word & POLARITY_BIT != 0);
             }
-            WordType::Vect12 => self.vector(word & PAYLOAD_MASK, 12, events),
-            WordType::Vect8 => self.vector(word & 0xFF, 8, events),
-            WordType::ExtTrigger => self.triggers += u64::from(self.time.is_some()),
-            WordType::NoEvents => {}
-            WordType::Unknown => self.damage.unknown_words += 1,
+            word_type::VECT_12 => self.vector(word & PAYLOAD_MASK, 12, events),
+            word_type::VECT_8 => self.vector(word & 0xFF, 8, events),
+            word_type::EXT_TRIGGER => self.triggers += u64::from(self.time.now().is_some()),
+            word_type::CONTINUED_4 | word_type::OTHERS | word_type::CONTINUED_12 => {}
+            _ => self.damage.unknown_words += 1,
         }
-    }
-
-    fn time_low(&mut self, low: u16) {
-        if self.time.is_some() {
-            self.set_time(low);
-        }
-    }
-
-    fn time_high(&mut self, high: u16) {
-        if self.time.is_none() {
-            self.high = high;
-            self.set_time(0);
-            return;
-        }
-        if high == self.high {
-            // The camera repeats its coarse time every 16 us; the fine time stays.
-            return;
-        }
-        let fall = i32::from(self.high) - i32::from(high);
-        if fall >= WRAP_THRESHOLD {
-            self.period_start = self.period_start.saturating_add(TIME_PERIOD_US);
-        }
-        if high != (self.high + 1) & PAYLOAD_MASK {
-            self.damage.time_jumps += 1;
-        }
-        self.high = high;
-        self.set_time(0);
-    }
-
-    fn set_time(&mut self, low: u16) {
-        self.time = Some(self.period_start.saturating_add(i64::from(self.high) << 12 | i64::from(low)));
     }
 
     fn row(&mut self, y: u16) {
@@ -220,7 +172,11 @@ impl State {
 
     fn vector(&mut self, mut valid: u16, pixels: u16, events: &mut Vec<Event>) {
         let Some(base) = self.base else {
-            self.damage.events_before_address += u64::from(valid.count_ones());
+            let events = u64::from(valid.count_ones());
+            match self.time.now() {
+                Some(_) => self.damage.events_before_address += events,
+                None => self.damage.events_before_time += events,
+            }
             return;
         };
         while valid != 0 {
@@ -234,7 +190,7 @@ impl State {
 
     #[inline]
     fn emit(&mut self, x: u16, polarity: Polarity, events: &mut Vec<Event>) {
-        match (self.time, self.row) {
+        match (self.time.now(), self.row) {
             (Some(t), Row::At(y)) if x < self.geometry.width => {
                 events.push(Event { t: CameraMicros(t), x, y, polarity });
             }
