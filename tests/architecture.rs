@@ -6,14 +6,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 /// Which crate of the project may depend on which. Development dependencies are free.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     ("evfocus-core", &[]),
     ("evfocus-ipc", &[]),
     ("evfocus-hal", &["evfocus-core"]),
+    ("evfocus-camera", &["evfocus-core", "evfocus-hal"]),
     ("evfocus-record", &["evfocus-core"]),
     ("hil-sim", &["evfocus-core", "evfocus-hal"]),
     ("evfocus-eval", &["evfocus-core", "evfocus-hal", "evfocus-record", "hil-sim"]),
-    ("evfocusd", &["evfocus-core", "evfocus-hal", "evfocus-ipc", "hil-sim"]),
+    ("evfocusd", &["evfocus-camera", "evfocus-core", "evfocus-hal", "evfocus-ipc", "hil-sim"]),
     (
         "evfocus",
         &[
@@ -36,7 +37,8 @@ const ARROWS: [(&str, &[&str]); 9] = [
 const LONGEST_CHAIN: usize = 4;
 
 /// Crates that only the named crates of the project may depend on.
-const FENCES: [(&str, &[&str]); 6] = [
+const FENCES: [(&str, &[&str]); 7] = [
+    ("nusb", &["evfocus-camera"]),
     ("tokio", &["evfocus-ipc", "evfocusd", "evfocus"]),
     ("serde", &["evfocus-eval", "evfocus-ipc", "evfocusd", "evfocus"]),
     ("clap", &["evfocusd", "evfocus"]),
