@@ -4,6 +4,8 @@
 //! that differ, noise, leak and a limited read-out; thin-lens blur; a motor with backlash, ripple and stick-slip; shake,
 //! moving scenes, flicker; and faults on schedule. Everything follows from one seed.
 //!
+//! The cameras are also there on the wire ([`WirePort`]): emulated USB devices that the real drivers can be put on.
+//!
 //! Not its job: knowing anything of the focus loop. What the simulator knows and a real rig does not tell
 //! ([`Rig::truth`]) never passes through the traits.
 
@@ -21,6 +23,7 @@ mod random;
 mod rig;
 mod scene;
 mod sensor;
+mod wire;
 
 pub use camera::SimCamera;
 pub use config::{ConfigError, Flicker, LinkConfig, RigConfig};
@@ -33,3 +36,4 @@ pub use optics::{OpticsConfig, PointSpread};
 pub use rig::Rig;
 pub use scene::Scene;
 pub use sensor::{CameraModel, Light, Logarithm, PatchNoise, RateCap, SensorConfig};
+pub use wire::{WireFaults, WireModel, WirePort, WireTransport};

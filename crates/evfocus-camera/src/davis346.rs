@@ -51,6 +51,9 @@ pub struct Davis346<T: UsbTransport> {
     serial: String,
     trigger_input: TriggerInput,
     streaming: Streaming<DavisWordDecoder>,
+    /// Jumps of the camera's time that have been looked into, and what it had dropped by then.
+    seen_jumps: u64,
+    seen_dropped: u64,
 }
 
 impl<T: UsbTransport> std::fmt::Debug for Davis346<T> {
@@ -68,8 +71,16 @@ impl<T: UsbTransport> Davis346<T> {
         let serial = transport.identity().serial.clone();
         let name = device_name(MODEL, &serial);
         let trigger_input = settings.trigger_input;
-        let mut camera =
-            Self { transport, clock, name, serial, trigger_input, streaming: Streaming::Stopped };
+        let mut camera = Self {
+            transport,
+            clock,
+            name,
+            serial,
+            trigger_input,
+            streaming: Streaming::Stopped,
+            seen_jumps: 0,
+            seen_dropped: 0,
+        };
         settings.check().map_err(|error| camera.error(DeviceErrorKind::OutOfRange, error.to_string()))?;
         camera.check_firmware()?;
         warn_of_slow_port(&camera.name, camera.transport.identity());
@@ -77,17 +88,13 @@ impl<T: UsbTransport> Davis346<T> {
         Ok(camera)
     }
 
-    /// Events that the camera has dropped because the host did not read, since it was plugged in; `None` if its logic does not
-    /// count them.
-    ///
-    /// # Errors
-    /// A transfer that failed.
-    pub fn dropped(&mut self) -> Result<Option<u64>, DeviceError> {
+    /// Events that the camera has dropped because nobody read them, since it got its power; 0 if its logic does not count them.
+    fn dropped(&mut self) -> Result<u64, DeviceError> {
         if self.get(mux::HAS_STATISTICS)? == 0 {
-            return Ok(None);
+            return Ok(0);
         }
         let low = Parameter { address: mux::DVS_DROPPED.address + 1, ..mux::DVS_DROPPED };
-        Ok(Some(u64::from(self.get(mux::DVS_DROPPED)?) << 32 | u64::from(self.get(low)?)))
+        Ok(u64::from(self.get(mux::DVS_DROPPED)?) << 32 | u64::from(self.get(low)?))
     }
 
     fn check_firmware(&self) -> Result<(), DeviceError> {
@@ -144,6 +151,7 @@ impl<T: UsbTransport> Camera for Davis346<T> {
         if !self.streaming.is_to_start(&self.name)? {
             return Ok(());
         }
+        (self.seen_jumps, self.seen_dropped) = (0, self.dropped()?);
         let (clock, decoder) = (Arc::clone(&self.clock), DavisWordDecoder::live());
         let stream = Stream::start(&mut self.transport, clock.as_ref(), DATA_ENDPOINT, QUEUE, decoder)
             .map_err(|error| transfer_error(error, &self.name, "queueing transfers"))?;
@@ -162,7 +170,16 @@ impl<T: UsbTransport> Camera for Davis346<T> {
 
     fn read(&mut self, batch: &mut EventBatch, timeout: Duration) -> Result<(), DeviceError> {
         let Self { transport, clock, name, streaming, .. } = self;
-        streaming.read(transport, clock.as_ref(), name, batch, timeout)
+        streaming.read(transport, clock.as_ref(), name, batch, timeout)?;
+        let jumps = streaming.decoder().map_or(0, |decoder| decoder.damage().time_jumps);
+        if jumps > self.seen_jumps {
+            // Wraps that were counted without being sent: the camera may have dropped events meanwhile.
+            self.seen_jumps = jumps;
+            let dropped = self.dropped()?;
+            batch.lost += dropped.saturating_sub(self.seen_dropped);
+            self.seen_dropped = dropped;
+        }
+        Ok(())
     }
 }
 

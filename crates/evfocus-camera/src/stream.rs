@@ -19,6 +19,9 @@ pub(crate) trait Decode {
 
     /// Appends the events in `bytes` to the batch.
     fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch);
+
+    /// A transfer has ended. Cameras send whole words, so half of one is damage, and must not shift what follows.
+    fn end_transfer(&mut self);
 }
 
 impl Decode for DavisWordDecoder {
@@ -27,6 +30,10 @@ impl Decode for DavisWordDecoder {
     fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         DavisWordDecoder::decode(self, bytes, batch);
     }
+
+    fn end_transfer(&mut self) {
+        self.finish();
+    }
 }
 
 impl Decode for Evt3Decoder {
@@ -34,6 +41,10 @@ impl Decode for Evt3Decoder {
 
     fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         Evt3Decoder::decode(self, bytes, batch);
+    }
+
+    fn end_transfer(&mut self) {
+        self.finish();
     }
 }
 
@@ -70,6 +81,14 @@ impl<D: Decode> Streaming<D> {
                 Ok(true)
             }
             Self::Gone => Err(transfer_error(UsbError::Disconnected, device, "stopping")),
+        }
+    }
+
+    /// The decoder of the stream under way.
+    pub(crate) fn decoder(&self) -> Option<&D> {
+        match self {
+            Self::Running(stream) => Some(&stream.decoder),
+            Self::Stopped | Self::Gone => None,
         }
     }
 
@@ -157,6 +176,7 @@ impl<D: Decode> Stream<D> {
             }
             match transport.receive(deadline.since(now)) {
                 Ok(Some(arrival)) => {
+                    self.decoder.end_transfer();
                     self.arrival = arrival;
                     self.taken = 0;
                     self.stalls = 0;

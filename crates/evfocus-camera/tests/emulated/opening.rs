@@ -1,0 +1,62 @@
+//! What can go wrong when a camera is opened: which part is wrong, and what helps, is said.
+
+use std::time::Duration;
+
+use evfocus_camera::Driver;
+use evfocus_hal::DeviceErrorKind;
+use hil_sim::WireFaults;
+
+use crate::common::Bench;
+
+/// Opening with these faults must fail as `kind`, and say all of `words`.
+fn refused(driver: Driver, faults: WireFaults, kind: DeviceErrorKind, words: &[&str]) {
+    let bench = Bench::new(driver);
+    bench.set_faults(faults);
+    let error = bench.open().and_then(|mut camera| camera.start()).unwrap_err();
+    assert_eq!(error.kind, kind, "{error}");
+    for word in words {
+        assert!(error.to_string().contains(word), "{word:?} is not in \"{error}\"");
+    }
+}
+
+#[test]
+fn wrong_firmware_is_named_with_the_one_needed() {
+    let firmware = |version| WireFaults { firmware: Some(version), ..WireFaults::default() };
+    refused(Driver::Davis346, firmware(4), DeviceErrorKind::Protocol, &["firmware is 4", "needs 6"]);
+    refused(
+        Driver::Evk4,
+        firmware(0x3_0700),
+        DeviceErrorKind::Protocol,
+        &["firmware is 3.7.0", "at least 3.8.0"],
+    );
+    let logic = WireFaults { logic: Some(17), ..WireFaults::default() };
+    refused(Driver::Davis346, logic, DeviceErrorKind::Protocol, &["logic is 17.1", "needs 18.1", "flashing"]);
+}
+
+#[test]
+fn answers_that_are_none_are_refused() {
+    for driver in Driver::ALL {
+        let faults = WireFaults { garbled_answers: true, ..WireFaults::default() };
+        refused(driver, faults, DeviceErrorKind::Protocol, &[]);
+    }
+}
+
+#[test]
+fn slow_answers_are_waited_for_and_missing_ones_are_not() {
+    for driver in Driver::ALL {
+        let bench = Bench::new(driver);
+        let slow = Duration::from_millis(40);
+        bench.set_faults(WireFaults { control_delay: slow, ..WireFaults::default() });
+        bench.open().unwrap().start().unwrap();
+        let faults = WireFaults { control_delay: Duration::from_secs(60), ..WireFaults::default() };
+        refused(driver, faults, DeviceErrorKind::TimedOut, &["unplug"]);
+    }
+}
+
+#[test]
+fn the_systems_limit_on_usb_memory_is_named() {
+    for driver in Driver::ALL {
+        let faults = WireFaults { no_memory_for: Some(4), ..WireFaults::default() };
+        refused(driver, faults, DeviceErrorKind::Fault, &["/sys/module/usbcore/parameters/usbfs_memory_mb"]);
+    }
+}
