@@ -29,7 +29,15 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ),
     (
         "evfocus-tests",
-        &["evfocus-core", "evfocus-eval", "evfocus-hal", "evfocus-record", "evfocusd", "hil-sim"],
+        &[
+            "evfocus-camera",
+            "evfocus-core",
+            "evfocus-eval",
+            "evfocus-hal",
+            "evfocus-record",
+            "evfocusd",
+            "hil-sim",
+        ],
     ),
 ];
 

@@ -1,5 +1,6 @@
 //! The configuration file: what users write, and what it means once it has been checked.
 
+mod camera;
 mod focus;
 mod simulation;
 mod value;
@@ -11,6 +12,7 @@ use evfocus_core::LensPosition;
 use evfocus_core::controller::{FocusRequest, Mode, Refusal};
 use serde::Deserialize;
 
+pub use camera::{Bias, CameraConfig, CameraSection};
 pub use focus::FocusSection;
 pub use simulation::{FaultSection, SimulationSection};
 pub(crate) use value::BadValue;
@@ -48,20 +50,6 @@ pub struct DaemonSection {
 impl Default for DaemonSection {
     fn default() -> Self {
         Self { socket: None, state_dir: None, reports_kept: 1000, mode: "auto".to_owned() }
-    }
-}
-
-/// `[camera]`
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CameraSection {
-    /// `simulated`.
-    pub backend: String,
-}
-
-impl Default for CameraSection {
-    fn default() -> Self {
-        Self { backend: "simulated".to_owned() }
     }
 }
 
@@ -112,6 +100,8 @@ pub struct Config {
     pub lens_min: Option<LensPosition>,
     /// See [`lens_min`](Self::lens_min).
     pub lens_max: Option<LensPosition>,
+    /// The camera.
+    pub camera: CameraConfig,
     /// How to focus.
     pub focus: FocusSection,
     /// The simulated rig.
@@ -189,11 +179,9 @@ impl Config {
     }
 
     fn check(file: ConfigFile) -> Result<Self, BadValue> {
-        let backends = [("camera.backend", &file.camera.backend), ("lens.backend", &file.lens.backend)];
-        for (key, backend) in backends {
-            if backend != "simulated" {
-                return Err(BadValue::new(key, backend, "this version knows only \"simulated\""));
-            }
+        if file.lens.backend != "simulated" {
+            let remedy = "this version knows only \"simulated\"";
+            return Err(BadValue::new("lens.backend", file.lens.backend, remedy));
         }
         let mode = match file.daemon.mode.as_str() {
             "auto" => Mode::Auto,
@@ -233,12 +221,14 @@ impl Config {
             lens_backlash: BadValue::check("lens.backlash_counts", file.lens.backlash_counts, 0.0, 1e6)?,
             lens_min: min.map(LensPosition),
             lens_max: max.map(LensPosition),
+            camera: file.camera.camera()?,
             rig: file.simulation.rig()?,
             focus: file.focus,
         };
         // Against the simulated lens, and the default run against both, now rather than at the first run.
         let controller = config.controller(&hil_sim_lens(&config.rig))?;
-        FocusRequest::default().resolve(&controller, config.rig.sensor.geometry).map_err(|refusal| {
+        let geometry = config.camera.geometry(config.rig.sensor.geometry);
+        FocusRequest::default().resolve(&controller, geometry).map_err(|refusal| {
             let is_interval = matches!(refusal, Refusal::Interval { .. });
             let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
             BadValue::new(key, "not fit for a default run", refusal.to_string())
