@@ -117,7 +117,7 @@ mod tests {
         let davis = found(Driver::Davis346, "7", Access::Free);
         let mut cameras = vec![davis.clone(), busy("")];
         assert_eq!(take_out(&mut cameras, (Driver::Evk4, "00000009")), Some("usb1:".to_owned()));
-        assert_eq!(cameras, [davis.clone()]);
+        assert_eq!(cameras.as_slice(), std::slice::from_ref(&davis));
         assert_eq!(take_out(&mut cameras, (Driver::Davis346, "8")), None);
         assert_eq!(take_out(&mut cameras, (Driver::Davis346, "7")), Some("usb1:7".to_owned()));
     }

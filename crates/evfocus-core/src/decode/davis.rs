@@ -32,6 +32,13 @@ enum Word {
     Wrap(u16),
 }
 
+/// Bits 11 to 0: what a word's code is about.
+const DATA_MASK: u16 = 0x0FFF;
+/// Of a column word: brighter.
+const POLARITY_BIT: u16 = 0x1000;
+/// Bits 15 to 13 of a column word.
+const COLUMN_KIND: u16 = 1;
+
 /// The special words that matter here; the others belong to frames and the inertial unit.
 mod special {
     pub(super) const RESERVED: u16 = 0;
@@ -46,12 +53,11 @@ impl Word {
         if word & 0x8000 != 0 {
             return Self::Time(word & 0x7FFF);
         }
-        let data = word & 0x0FFF;
+        let data = word & DATA_MASK;
         match word >> 12 {
             0 => Self::Special(data),
             1 => Self::Row(data),
-            2 => Self::Column(data, Polarity::Off),
-            3 => Self::Column(data, Polarity::On),
+            2 | 3 => Self::Column(data, Polarity::from_on(word & POLARITY_BIT != 0)),
             7 => Self::Wrap(data),
             _ => Self::NoEvents,
         }
@@ -108,7 +114,7 @@ impl DavisWordDecoder {
     pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         let state = &mut self.state;
         let dropped = state.damage.events_before_address + state.damage.outside_sensor;
-        self.framing.feed(bytes, |word| state.word(u16::from_le_bytes(word), &mut batch.events));
+        self.framing.feed_slices(bytes, |words| state.words(words, &mut batch.events));
         batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
         batch.reached = state.time.now().map(CameraMicros).or(batch.reached);
     }
@@ -137,13 +143,27 @@ impl Default for DavisWordDecoder {
 }
 
 impl State {
-    fn word(&mut self, word: u16, events: &mut Vec<Event>) {
-        match Word::of(word) {
+    fn words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
+        while let Some((&first, rest)) = words.split_first() {
+            let word = Word::of(u16::from_le_bytes(first));
+            if !matches!(word, Word::Column(..)) {
+                self.word(word);
+                words = rest;
+                continue;
+            }
+            // Events come in runs of one row and time, which are written without looking again.
+            let (columns, rest) = words.split_at(words.iter().take_while(|word| is_column(**word)).count());
+            self.columns(columns, events);
+            words = rest;
+        }
+    }
+
+    fn word(&mut self, word: Word) {
+        match word {
             Word::Time(low) => self.time.low(low),
             Word::Row(row) => self.row(row),
-            Word::Column(column, polarity) => self.event(column, polarity, events),
             Word::Special(signal) => self.special(signal),
-            Word::NoEvents => {}
+            Word::NoEvents | Word::Column(..) => {}
             Word::Wrap(times) => self.time.wrap(times),
         }
     }
@@ -163,16 +183,36 @@ impl State {
         self.column = if exists { Column::At(row) } else { Column::OutsideSensor };
     }
 
-    fn event(&mut self, y: u16, polarity: Polarity, events: &mut Vec<Event>) {
-        match (self.time.now(), self.column) {
-            (Some(t), Column::At(x)) if y < DavisWordDecoder::GEOMETRY.height => {
-                events.push(Event { t: CameraMicros(t), x, y, polarity });
-            }
-            (None, _) => self.damage.events_before_time += 1,
-            (Some(_), Column::None) => self.damage.events_before_address += 1,
-            (Some(_), Column::At(_) | Column::OutsideSensor) => self.damage.outside_sensor += 1,
+    /// Words of which each is an event of the same time and row.
+    fn columns(&mut self, words: &[[u8; 2]], events: &mut Vec<Event>) {
+        let all = words.len() as u64;
+        let (t, x) = match (self.time.now(), self.column) {
+            (Some(t), Column::At(x)) => (CameraMicros(t), x),
+            (None, _) => return self.damage.events_before_time += all,
+            (Some(_), Column::None) => return self.damage.events_before_address += all,
+            (Some(_), Column::OutsideSensor) => return self.damage.outside_sensor += all,
+        };
+        let row = |bytes: &[u8; 2]| u16::from_le_bytes(*bytes) & DATA_MASK;
+        let event = |bytes: &[u8; 2]| Event {
+            t,
+            x,
+            y: row(bytes),
+            polarity: Polarity::from_on(u16::from_le_bytes(*bytes) & POLARITY_BIT != 0),
+        };
+        let exists = |bytes: &&[u8; 2]| row(bytes) < DavisWordDecoder::GEOMETRY.height;
+        if words.iter().all(|bytes| exists(&bytes)) {
+            events.extend(words.iter().map(event));
+        } else {
+            let before = events.len();
+            events.extend(words.iter().filter(exists).map(event));
+            self.damage.outside_sensor += all - (events.len() - before) as u64;
         }
     }
+}
+
+/// Whether a word is a column, of either polarity.
+fn is_column(bytes: [u8; 2]) -> bool {
+    u16::from_le_bytes(bytes) >> 13 == COLUMN_KIND
 }
 
 /// Whether `bytes`, the start of a file, could be nothing but DAVIS346 words: every word is one that the camera sends, all

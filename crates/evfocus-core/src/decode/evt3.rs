@@ -120,7 +120,7 @@ impl Evt3Decoder {
     pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         let state = &mut self.state;
         let dropped = state.damage.events_before_address + state.damage.outside_sensor;
-        self.framing.feed(bytes, |word| state.word(u16::from_le_bytes(word), &mut batch.events));
+        self.framing.feed_slices(bytes, |words| state.words(words, &mut batch.events));
         batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
         batch.reached = state.time.now().map(CameraMicros).or(batch.reached);
     }
@@ -143,9 +143,25 @@ impl Evt3Decoder {
 }
 
 impl State {
+    fn words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
+        while let Some((&first, rest)) = words.split_first() {
+            let word = u16::from_le_bytes(first);
+            if word >> 12 != word_type::ADDR_X {
+                self.word(word, events);
+                words = rest;
+                continue;
+            }
+            // Single events come in runs of one row and time, which are written without looking again.
+            let is_single = |bytes: &&[u8; 2]| u16::from_le_bytes(**bytes) >> 12 == word_type::ADDR_X;
+            let (singles, rest) = words.split_at(words.iter().take_while(is_single).count());
+            self.singles(singles, events);
+            words = rest;
+        }
+    }
+
+    /// Any word but ADDR_X.
     fn word(&mut self, word: u16, events: &mut Vec<Event>) {
         match word >> 12 {
-            word_type::ADDR_X => self.single(word, events),
             word_type::TIME_LOW => self.time.low(word & PAYLOAD_MASK),
             word_type::ADDR_Y => self.row(word & ADDRESS_MASK),
             word_type::TIME_HIGH => self.time.high(word & PAYLOAD_MASK),
@@ -165,38 +181,62 @@ impl State {
         self.row = if y < self.geometry.height { Row::At(y) } else { Row::OutsideSensor };
     }
 
-    fn single(&mut self, word: u16, events: &mut Vec<Event>) {
-        let polarity = Polarity::from_on(word & POLARITY_BIT != 0);
-        self.emit(word & ADDRESS_MASK, polarity, events);
-    }
-
-    fn vector(&mut self, mut valid: u16, pixels: u16, events: &mut Vec<Event>) {
-        let Some(base) = self.base else {
-            let events = u64::from(valid.count_ones());
-            match self.time.now() {
-                Some(_) => self.damage.events_before_address += events,
-                None => self.damage.events_before_time += events,
-            }
+    fn singles(&mut self, words: &[[u8; 2]], events: &mut Vec<Event>) {
+        let (Some(t), Row::At(y)) = (self.time.now(), self.row) else {
+            self.drop(words.len());
             return;
         };
-        while valid != 0 {
-            let offset = valid.trailing_zeros() as u16;
-            valid &= valid - 1;
-            self.emit(base.saturating_add(offset), self.polarity, events);
+        let width = self.geometry.width;
+        let column = |bytes: &[u8; 2]| u16::from_le_bytes(*bytes) & ADDRESS_MASK;
+        let event = |bytes: &[u8; 2]| Event {
+            t: CameraMicros(t),
+            x: column(bytes),
+            y,
+            polarity: Polarity::from_on(u16::from_le_bytes(*bytes) & POLARITY_BIT != 0),
+        };
+        let outside = words.iter().filter(|bytes| column(bytes) >= width).count();
+        if outside == 0 {
+            events.extend(words.iter().map(event));
+        } else {
+            events.extend(words.iter().filter(|bytes| column(bytes) < width).map(event));
+            self.damage.outside_sensor += outside as u64;
         }
-        // Saturates on streams that are not a camera's: columns that far out are dropped anyhow.
-        self.base = Some(base.saturating_add(pixels));
     }
 
-    #[inline]
-    fn emit(&mut self, x: u16, polarity: Polarity, events: &mut Vec<Event>) {
+    fn vector(&mut self, valid: u16, pixels: u16, events: &mut Vec<Event>) {
+        // Saturates on streams that are not a camera's: columns that far out are dropped anyhow.
+        let next = self.base.map(|base| base.saturating_add(pixels));
+        let base = core::mem::replace(&mut self.base, next);
+        let (Some(base), Some(t), Row::At(y)) = (base, self.time.now(), self.row) else {
+            self.drop(valid.count_ones() as usize);
+            return;
+        };
+        let on_sensor = (1 << self.geometry.width.saturating_sub(base).min(pixels)) - 1;
+        let inside = valid & on_sensor;
+        self.damage.outside_sensor += u64::from((valid ^ inside).count_ones());
+        // Each offset is written, and kept if its bit is set: a branch for each bit would be guessed wrong half of the time.
+        let (mut offsets, mut count) = ([0_u8; 16], 0);
+        for offset in 0..12_u8 {
+            offsets[count & 0xF] = offset;
+            count += usize::from(inside >> offset & 1);
+        }
+        let (t, polarity) = (CameraMicros(t), self.polarity);
+        let valid_offsets = offsets.get(..count).unwrap_or_default();
+        events.extend(valid_offsets.iter().map(|&offset| Event {
+            t,
+            x: base + u16::from(offset),
+            y,
+            polarity,
+        }));
+    }
+
+    /// Events that cannot be placed.
+    fn drop(&mut self, events: usize) {
+        let events = events as u64;
         match (self.time.now(), self.row) {
-            (Some(t), Row::At(y)) if x < self.geometry.width => {
-                events.push(Event { t: CameraMicros(t), x, y, polarity });
-            }
-            (None, _) => self.damage.events_before_time += 1,
-            (Some(_), Row::None) => self.damage.events_before_address += 1,
-            (Some(_), Row::At(_) | Row::OutsideSensor) => self.damage.outside_sensor += 1,
+            (None, _) => self.damage.events_before_time += events,
+            (Some(_), Row::None | Row::At(_)) => self.damage.events_before_address += events,
+            (Some(_), Row::OutsideSensor) => self.damage.outside_sensor += events,
         }
     }
 }
