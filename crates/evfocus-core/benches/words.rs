@@ -145,7 +145,7 @@ fn main() {
             total
         };
         let decode = |decoder: &mut Evt3Decoder, transfer: &[u8], batch: &mut EventBatch| {
-            decoder.decode(transfer, batch)
+            decoder.decode(transfer, batch);
         };
         measure(name, &bytes, || Evt3Counter::new(BIN_US), count, || Evt3Decoder::live(SENSOR), decode);
     }
@@ -156,7 +156,7 @@ fn main() {
         total
     };
     let decode = |decoder: &mut DavisWordDecoder, transfer: &[u8], batch: &mut EventBatch| {
-        decoder.decode(transfer, batch)
+        decoder.decode(transfer, batch);
     };
     let name = "DAVIS346, 10 million events/s";
     measure(name, &bytes, || DavisWordCounter::new(BIN_US), count, DavisWordDecoder::live, decode);

@@ -123,9 +123,13 @@ impl Device for Davis346 {
         faults: &WireFaults,
     ) -> Result<usize, UsbError> {
         let VendorRequest { request: 0xBF, value, index } = request else { return Err(UsbError::Stalled) };
-        let told = match (value, index, faults.logic) {
-            (6, 0, Some(logic)) => logic,
-            _ => self.get(value as u8, index as u8),
+        let told = match faults.told {
+            Some((module, parameter, told))
+                if (u16::from(module), parameter) == (value, u32::from(index)) =>
+            {
+                told
+            }
+            Some(_) | None => self.get(value as u8, index as u8),
         };
         for (slot, byte) in answer.iter_mut().zip(told.to_be_bytes()) {
             *slot = byte;

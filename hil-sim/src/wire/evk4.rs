@@ -89,7 +89,11 @@ impl Evk4 {
             (0x1_0001, [0]) => named(b"EVK4\0"),
             (0x1_0003, [0]) => named(b"psee,ccam5_imx636\0psee,ccam5_gen42\0"),
             (0x1_0102, &[0, address, count]) if count <= 250 => {
-                let values = (0..count).map(|index| self.get(address.wrapping_add(4 * index)));
+                let read = |address| match faults.told {
+                    Some((_, place, told)) if place == address => told,
+                    Some(_) | None => self.get(address),
+                };
+                let values = (0..count).map(|index| read(address.wrapping_add(4 * index)));
                 of(&[0, address].into_iter().chain(values).collect::<Vec<_>>())
             }
             (0x4001_0102, &[0, address, ref values @ ..]) => {

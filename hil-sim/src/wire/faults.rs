@@ -8,8 +8,9 @@ use std::time::Duration;
 pub struct WireFaults {
     /// The device says that it has this firmware: `bcdDevice` of a DAVIS346, the release of an EVK4.
     pub firmware: Option<u32>,
-    /// The DAVIS346 says that it has this logic.
-    pub logic: Option<u32>,
+    /// A register reads as this value, whatever it holds: module, parameter and value of the DAVIS346; zero, address and value of the
+    /// EVK4.
+    pub told: Option<(u8, u32, u32)>,
     /// Requests take this long; more than the host waits is no answer.
     pub control_delay: Duration,
     /// Every answer is garbage.

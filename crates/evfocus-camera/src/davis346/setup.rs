@@ -1,5 +1,6 @@
 //! Setting the camera up, starting and stopping it.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use evfocus_core::Window;
@@ -27,6 +28,9 @@ const BEFORE_POWER: Duration = Duration::from_millis(10);
 const SETTLE: Duration = Duration::from_millis(200);
 /// Between the link's start and the pixels'.
 const BEFORE_PIXELS: Duration = Duration::from_millis(50);
+/// Clocks that boards have or might have, and by how many per mille they might be off.
+const CLOCKS_MHZ: RangeInclusive<u32> = 1..=1000;
+const CLOCK_DEVIATIONS: RangeInclusive<u32> = 500..=2000;
 /// Shortest pulse at the external input, microseconds.
 const PULSE_US: u64 = 10;
 
@@ -53,10 +57,11 @@ impl<T: UsbTransport> Davis346<T> {
     /// From an unknown state to one in which [`run`](Self::run) starts the stream.
     pub(super) fn set_up(&mut self, settings: &Settings) -> Result<(), DeviceError> {
         self.check_logic()?;
-        let deviation = u64::from(self.get(system::CLOCK_DEVIATION)?);
-        let (logic_mhz, usb_mhz) = (self.get(system::LOGIC_CLOCK)?, self.get(system::USB_CLOCK)?);
+        let deviation = self.get_within(system::CLOCK_DEVIATION, CLOCK_DEVIATIONS)?;
+        let logic_mhz = self.get_within(system::LOGIC_CLOCK, CLOCKS_MHZ)?;
+        let usb_mhz = self.get_within(system::USB_CLOCK, CLOCKS_MHZ)?;
         self.check_sensor()?;
-        let cycles = |mhz: u32, micros: u64| ((micros * u64::from(mhz) * deviation + 500) / 1000) as u32;
+        let cycles = |mhz: u64, micros: u64| ((micros * mhz * deviation + 500) / 1000) as u32;
         self.quiet()?;
         if self.get(external::HAS_GENERATOR)? != 0 {
             self.set(external::RUN_GENERATOR, 0)?;
@@ -86,6 +91,18 @@ impl<T: UsbTransport> Davis346<T> {
         }
         let (found, needed) = (format!("{version}.{patch}"), format!("{LOGIC_VERSION}.{LOGIC_PATCH}"));
         Err(wrong_version(&self.name, "logic", &found, &needed, "change it with the maker's flashing tool"))
+    }
+
+    /// A number that the logic tells of itself, which cycles are counted from.
+    fn get_within(&mut self, parameter: Parameter, sane: RangeInclusive<u32>) -> Result<u64, DeviceError> {
+        let value = self.get(parameter)?;
+        if sane.contains(&value) {
+            return Ok(u64::from(value));
+        }
+        let (Parameter { module, address }, (low, high)) = (parameter, (sane.start(), sane.end()));
+        let what =
+            format!("parameter {address} of module {module} is {value}; it must be from {low} to {high}");
+        Err(self.error(DeviceErrorKind::Protocol, what))
     }
 
     fn check_sensor(&mut self) -> Result<(), DeviceError> {

@@ -29,8 +29,25 @@ fn wrong_firmware_is_named_with_the_one_needed() {
         DeviceErrorKind::Protocol,
         &["firmware is 3.7.0", "at least 3.8.0"],
     );
-    let logic = WireFaults { logic: Some(17), ..WireFaults::default() };
+    let logic = WireFaults { told: Some((6, 0, 17)), ..WireFaults::default() };
     refused(Driver::Davis346, logic, DeviceErrorKind::Protocol, &["logic is 17.1", "needs 18.1", "flashing"]);
+}
+
+#[test]
+fn another_sensor_and_senseless_clocks_are_named() {
+    let told =
+        |module, address, value| WireFaults { told: Some((module, address, value)), ..WireFaults::default() };
+    let davis346 = |module, parameter, value, words: &[&str]| {
+        let faults = told(module, parameter, value);
+        refused(Driver::Davis346, faults, DeviceErrorKind::Protocol, words);
+    };
+    davis346(6, 1, 2, &["chip is number 2", "260", "346"]);
+    davis346(1, 0, 640, &["640 columns"]);
+    davis346(6, 5, 0, &["parameter 5 of module 6 is 0", "1 to 1000"]);
+    davis346(6, 6, u32::MAX, &["parameter 6 of module 6 is 4294967295", "500 to 2000"]);
+    let chip = ["0x00000001", "0xa0401806"];
+    refused(Driver::Evk4, told(0, 0x14, 1), DeviceErrorKind::Protocol, &chip);
+    refused(Driver::Evk4, told(0, 0xF128, 2), DeviceErrorKind::Protocol, &["variant 2"]);
 }
 
 #[test]
