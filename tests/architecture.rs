@@ -6,15 +6,19 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 /// Which crate of the project may depend on which. Development dependencies are free.
-const ARROWS: [(&str, &[&str]); 10] = [
+const ARROWS: [(&str, &[&str]); 11] = [
     ("evfocus-core", &[]),
     ("evfocus-ipc", &[]),
     ("evfocus-hal", &["evfocus-core"]),
+    ("evfocus-camera", &["evfocus-core", "evfocus-hal"]),
     ("evfocus-lens", &["evfocus-core", "evfocus-hal"]),
     ("evfocus-record", &["evfocus-core"]),
     ("hil-sim", &["evfocus-core", "evfocus-hal"]),
     ("evfocus-eval", &["evfocus-core", "evfocus-hal", "evfocus-record", "hil-sim"]),
-    ("evfocusd", &["evfocus-core", "evfocus-hal", "evfocus-ipc", "evfocus-lens", "hil-sim"]),
+    (
+        "evfocusd",
+        &["evfocus-camera", "evfocus-core", "evfocus-hal", "evfocus-ipc", "evfocus-lens", "hil-sim"],
+    ),
     (
         "evfocus",
         &[
@@ -29,7 +33,15 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ),
     (
         "evfocus-tests",
-        &["evfocus-core", "evfocus-eval", "evfocus-hal", "evfocus-record", "evfocusd", "hil-sim"],
+        &[
+            "evfocus-camera",
+            "evfocus-core",
+            "evfocus-eval",
+            "evfocus-hal",
+            "evfocus-record",
+            "evfocusd",
+            "hil-sim",
+        ],
     ),
 ];
 
@@ -37,7 +49,8 @@ const ARROWS: [(&str, &[&str]); 10] = [
 const LONGEST_CHAIN: usize = 4;
 
 /// Crates that only the named crates of the project may depend on.
-const FENCES: [(&str, &[&str]); 7] = [
+const FENCES: [(&str, &[&str]); 8] = [
+    ("nusb", &["evfocus-camera"]),
     ("tokio", &["evfocus-ipc", "evfocusd", "evfocus"]),
     ("serde", &["evfocus-eval", "evfocus-ipc", "evfocusd", "evfocus"]),
     ("clap", &["evfocusd", "evfocus"]),

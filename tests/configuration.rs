@@ -45,6 +45,37 @@ fn the_optional_keys_are_annotated_with_what_is_used_without_them() {
     assert_eq!(written, nothing);
 }
 
+/// The optional keys of a camera's file mean what is used without them, except those that must name something.
+#[test]
+fn the_cameras_files_are_annotated_with_what_is_used_without_them() {
+    use evfocusd::config::CameraConfig;
+    let written = |name: &str, left_out: &[&str]| {
+        let text = std::fs::read_to_string(folder().join(name)).unwrap();
+        let is_left_out = |line: &str| left_out.iter().any(|key| line.starts_with(&format!("# {key} =")));
+        let line = |line: &str| {
+            let key = line
+                .strip_prefix("# ")
+                .filter(|rest| rest.split_once(" = ").is_some_and(|(key, _)| !key.contains(' ')));
+            key.filter(|_| !is_left_out(line)).unwrap_or(line).to_owned()
+        };
+        let keys: Vec<String> = text.lines().map(line).collect();
+        Config::parse(&keys.join("\n"), Path::new(name)).unwrap().camera
+    };
+    let whole = |geometry| Some(evfocus_core::Window::whole(geometry));
+    let left_out = ["serial", "masked_pixels", "activity_filter_ms", "refractory_filter_ms"];
+    let CameraConfig::Davis346 { mut settings, .. } = written("davis346.toml", &left_out) else { panic!() };
+    assert_eq!(settings.roi.take(), whole(evfocus_camera::davis346::GEOMETRY));
+    let biases = std::mem::take(&mut settings.biases);
+    assert_eq!(settings, evfocus_camera::davis346::Settings::default());
+    assert_eq!(biases.len(), 6);
+    let left_out = ["serial", "masked_pixels", "rate_limit_events_per_s"];
+    let CameraConfig::Evk4 { mut settings, .. } = written("evk4.toml", &left_out) else { panic!() };
+    assert_eq!(settings.roi.take(), whole(evfocus_camera::evk4::GEOMETRY));
+    let biases = std::mem::take(&mut settings.biases);
+    assert_eq!(settings, evfocus_camera::evk4::Settings::default());
+    assert_eq!(biases.iter().filter(|(_, offset)| *offset == 0).count(), 6);
+}
+
 /// What a mistake is answered with must name the file and everything in `words`.
 fn refused(text: &str, words: &[&str]) {
     let parsed = Config::parse(text, Path::new("/etc/evfocus/rig.toml"));
@@ -73,6 +104,44 @@ fn mistakes_are_named_with_key_value_and_remedy() {
         &["line 2", "lens.backend", "moonlight", "simulated", "moonlite"],
     );
     refused("[lens]\nport = \"/dev/ttyUSB0\"", &["line 2", "lens.port", "simulated"]);
+    refused("[camera]\nbackend = \"evk5\"", &["line 2", "camera.backend", "evk5", "davis346", "evk4"]);
+    refused("[camera]\nserial = \"1\"", &["line 2", "camera.serial", "simulated"]);
+    refused(
+        "[camera]\nbackend = \"evk4\"\npacket_delay_ms = 1",
+        &["line 3", "camera.packet_delay_ms", "evk4"],
+    );
+    refused(
+        "[camera]\nbackend = \"davis346\"\nrow_order = \"top-down\"",
+        &["line 3", "row_order", "davis346"],
+    );
+    refused("[camera]\nbackend = \"davis346\"\nserial = \"\"", &["line 3", "camera.serial"]);
+    refused(
+        "[camera]\nbackend = \"davis346\"\n[camera.biases]\nPrBp = 5",
+        &["line 4", "PrBp", "[coarse, fine]"],
+    );
+    refused(
+        "[camera]\nbackend = \"davis346\"\n[camera.biases]\nPrBp = [9, 5]",
+        &["line 4", "PrBp", "0 to 7"],
+    );
+    refused(
+        "[camera]\nbackend = \"evk4\"\n[camera.biases]\nbias_fo = [1, 2]",
+        &["line 4", "bias_fo", "offset"],
+    );
+    refused(
+        "[camera]\nbackend = \"evk4\"\n[camera.biases]\nbias_fo = 201",
+        &["line 4", "bias_fo", "-150 to 200"],
+    );
+    refused("[camera]\nbackend = \"evk4\"\n[camera.biases]\nbias_x = 1", &["bias_x", "bias_diff_on"]);
+    refused("[camera]\nbackend = \"evk4\"\nroi = [1200, 0, 100, 10]", &["line 3", "camera.roi", "1280x720"]);
+    refused("[camera]\nbackend = \"evk4\"\nrate_limit_events_per_s = 1", &["line 3", "rate_limit", "5000"]);
+    refused(
+        "[camera]\nbackend = \"davis346\"\ntrigger_input = \"edges\"",
+        &["line 3", "trigger_input", "pulse"],
+    );
+    refused(
+        "[camera]\nbackend = \"davis346\"\nactivity_filter_ms = 0.1",
+        &["line 3", "activity_filter_ms", "0.25"],
+    );
     refused("[lens]\nmin_counts = 3000\nmax_counts = 300", &["lens.min_counts", "3000", "300"]);
     refused("[lens]\nmax_counts = 9999", &["lens.max_counts", "9999", "3750"]);
     refused("[simulation]\nscene = \"cat\"", &["simulation.scene", "cat", "dead-leaves"]);

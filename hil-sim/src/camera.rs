@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use evfocus_core::{EventBatch, HostMicros};
+use evfocus_core::{CameraMicros, EventBatch, HostMicros};
 use evfocus_hal::{Camera, CameraInfo, Clock, DeviceError, DeviceErrorKind};
 
 use crate::faults::FaultKind;
@@ -52,6 +52,16 @@ impl SimCamera {
 
     fn error(&self, kind: DeviceErrorKind, what: &str) -> DeviceError {
         DeviceError::new(kind, format!("{} {}", self.picture.config().sensor.model, self.serial), what)
+    }
+
+    /// Whether the camera has been unplugged since this handle was opened.
+    pub(crate) fn is_unplugged(&mut self) -> bool {
+        self.check_plugged().is_err()
+    }
+
+    /// The camera time up to which the stream has been computed; `None` unless it is started.
+    pub(crate) fn reached(&self) -> Option<CameraMicros> {
+        self.running.as_ref().map(Running::reached)
     }
 
     fn check_plugged(&mut self) -> Result<(), DeviceError> {

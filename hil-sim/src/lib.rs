@@ -4,7 +4,8 @@
 //! that differ, noise, leak and a limited read-out; thin-lens blur; a motor with backlash, ripple and stick-slip; shake,
 //! moving scenes, flicker; and faults on schedule. Everything follows from one seed.
 //!
-//! [`wire`] puts lens controllers in front of the lens as they are on the wire: bytes in, bytes out.
+//! [`wire`] puts lens controllers in front of the lens as they are on the wire: bytes in, bytes out. The cameras are there on the
+//! wire too ([`UsbPort`]): emulated USB devices that the real drivers can be put on.
 //!
 //! Not its job: knowing anything of the focus loop. What the simulator knows and a real rig does not tell
 //! ([`Rig::truth`]) never passes through the traits.
@@ -23,6 +24,7 @@ mod random;
 mod rig;
 mod scene;
 mod sensor;
+mod usb;
 pub mod wire;
 
 pub use camera::SimCamera;
@@ -36,3 +38,4 @@ pub use optics::{OpticsConfig, PointSpread};
 pub use rig::Rig;
 pub use scene::Scene;
 pub use sensor::{CameraModel, Light, Logarithm, PatchNoise, RateCap, SensorConfig};
+pub use usb::{EmulatedUsb, UsbFaults, UsbModel, UsbPort};

@@ -114,6 +114,11 @@ impl Rig {
         image
     }
 
+    /// The clock that the rig lives by.
+    pub(crate) fn clock(&self) -> Arc<dyn Clock> {
+        Arc::clone(&self.clock)
+    }
+
     fn seconds(&self, time: HostMicros) -> f64 {
         time.micros_since(self.epoch) as f64 / 1e6
     }

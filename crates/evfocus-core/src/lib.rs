@@ -1,4 +1,4 @@
-//! The pure core of evfocus: it counts events, aligns clocks, measures focus, searches for it, and decides what a focus run
+//! The pure core of evfocus: it decodes what cameras send, counts events, aligns clocks, measures focus, searches for it, and decides what a focus run
 //! does next.
 //!
 //! Not its job: opening devices, waiting, reading clocks, spawning, logging. Time is an argument everywhere. The crate is
@@ -15,6 +15,8 @@ mod clock_map;
 pub mod controller;
 mod counter;
 mod curve;
+mod damage;
+pub mod decode;
 mod delay;
 mod event;
 mod event_store;
@@ -34,6 +36,7 @@ pub use clock_map::{ClockEvent, ClockMap, ClockMapQuality, NoClockYet};
 pub use controller::{Controller, ControllerConfig};
 pub use counter::{CounterError, CumulativeCounter, EventCounts};
 pub use curve::{CurvePoint, FocusCurve};
+pub use damage::Damage;
 pub use delay::{Delay, DelayModel};
 pub use event::{Event, EventBatch, Geometry, Polarity, Window};
 pub use event_store::EventStore;

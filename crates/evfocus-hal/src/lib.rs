@@ -1,5 +1,5 @@
 //! The hardware traits of evfocus, written for the needs of the focus loop: a camera that is read, a lens that is moved and
-//! sampled, a clock that is asked and waited on; and the bytes that go to and from a device.
+//! sampled, a clock that is asked and waited on; and below them the bytes that go to and from a device, over a line or over USB.
 //!
 //! Not their job: deciding anything. Implementations know neither each other nor the daemon. Each is put through
 //! [`conformance`] by its own tests.
@@ -10,6 +10,7 @@ pub mod conformance;
 mod error;
 mod lens;
 mod transport;
+pub mod usb;
 
 pub use camera::{Camera, CameraInfo};
 pub use clock::{Clock, SystemClock, VirtualClock, unix_time};

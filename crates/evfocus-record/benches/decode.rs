@@ -7,8 +7,8 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use evfocus_core::decode::Evt3Decoder;
 use evfocus_core::{EventBatch, Geometry};
-use evfocus_record::decode::Evt3Decoder;
 use evfocus_record::encode::Evt3Encoder;
 use evfocus_record::{MAX_EVENTS_PER_READ, READ_BYTES, Recording};
 

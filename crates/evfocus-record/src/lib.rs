@@ -2,7 +2,7 @@
 //!
 //! [`Recording::open`] recognises a file by its content and hands out its events batch by batch; [`Summary`] counts a whole
 //! file in one pass; [`Evt3Writer`] and its siblings write files that the tools of the field read; [`positions`] reads and
-//! writes where the lens was meanwhile. The decoders in [`decode`] are pure functions of bytes and serve live cameras too.
+//! writes where the lens was meanwhile. The decoders are those of live cameras, [`evfocus_core::decode`].
 //!
 //! Not its job: judging whether a recording is good enough to focus with, opening devices, decompressing archives.
 //!
@@ -12,11 +12,9 @@
 
 pub mod aedat4;
 pub mod csv;
-pub mod decode;
 pub mod encode;
 pub mod positions;
 
-mod damage;
 mod error;
 mod format;
 mod raw_header;
@@ -28,7 +26,6 @@ mod words;
 
 pub use aedat4::{Aedat4Compression, Aedat4Writer};
 pub use csv::CsvWriter;
-pub use damage::Damage;
 pub use error::RecordError;
 pub use format::{Format, UnknownFormat};
 pub use raw_writer::Evt3Writer;

@@ -4,15 +4,15 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use evfocus_core::{Event, EventBatch, Geometry};
+use evfocus_core::decode::{DavisWordDecoder, Evt3Decoder};
+use evfocus_core::{Damage, Event, EventBatch, Geometry};
 
 use crate::aedat4::Aedat4Source;
 use crate::csv::CsvSource;
-use crate::decode::{DavisWordDecoder, Evt3Decoder};
 use crate::raw_header::{MAX_HEADER_BYTES, RawHeader};
 use crate::sniff::{Sniffed, sniff};
 use crate::words::{WordDecoder, WordSource};
-use crate::{Damage, Format, RecordError};
+use crate::{Format, RecordError};
 
 /// Bytes read from a file at a time.
 pub const READ_BYTES: usize = 16 * 1024;

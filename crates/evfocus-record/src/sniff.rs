@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::Format;
 use crate::csv::Layout;
-use crate::decode::looks_like_davis_words;
 use crate::raw_header::{Encoding, RawHeader};
+use evfocus_core::decode::davis::looks_like_davis_words;
 
 /// What the content of a file is, or why that is not clear.
 #[derive(Debug)]

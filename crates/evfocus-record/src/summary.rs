@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use evfocus_core::{Event, EventBatch, EventRate, Geometry};
+use evfocus_core::{Damage, Event, EventBatch, EventRate, Geometry};
 
-use crate::{Damage, Format, MAX_EVENTS_PER_READ, RecordError, Recording};
+use crate::{Format, MAX_EVENTS_PER_READ, RecordError, Recording};
 
 /// A silence longer than this is a gap, in microseconds.
 pub const GAP_US: i64 = 100_000;

@@ -3,10 +3,10 @@
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
-use evfocus_core::{CameraMicros, EventBatch, Geometry};
+use evfocus_core::decode::{DavisWordDecoder, Evt2Decoder, Evt3Decoder};
+use evfocus_core::{CameraMicros, Damage, EventBatch, Geometry};
 
-use crate::decode::{DavisWordDecoder, Evt2Decoder, Evt3Decoder};
-use crate::{Damage, READ_BYTES};
+use crate::READ_BYTES;
 
 /// A decoder of one of the kinds of words.
 #[derive(Debug)]

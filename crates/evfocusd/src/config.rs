@@ -1,5 +1,6 @@
 //! The configuration file: what users write, and what it means once it has been checked.
 
+mod camera;
 mod focus;
 mod lens;
 mod simulation;
@@ -12,6 +13,7 @@ use evfocus_core::LensPosition;
 use evfocus_core::controller::{FocusRequest, Mode, Refusal};
 use serde::Deserialize;
 
+pub use camera::{Bias, CameraConfig, CameraSection};
 pub use focus::FocusSection;
 pub use lens::{
     DriveSection, FirmataSection, GrblSection, IndiSection, LabJackSection, LensBackend, LensDriver,
@@ -56,20 +58,6 @@ impl Default for DaemonSection {
     }
 }
 
-/// `[camera]`
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CameraSection {
-    /// `simulated`.
-    pub backend: String,
-}
-
-impl Default for CameraSection {
-    fn default() -> Self {
-        Self { backend: "simulated".to_owned() }
-    }
-}
-
 /// The configuration, checked.
 #[derive(Debug, Clone)]
 pub struct Config {
@@ -91,6 +79,8 @@ pub struct Config {
     pub lens_min: Option<LensPosition>,
     /// See [`lens_min`](Self::lens_min).
     pub lens_max: Option<LensPosition>,
+    /// The camera.
+    pub camera: CameraConfig,
     /// How to focus.
     pub focus: FocusSection,
     /// The simulated rig.
@@ -168,10 +158,6 @@ impl Config {
     }
 
     fn check(file: ConfigFile) -> Result<Self, BadValue> {
-        if file.camera.backend != "simulated" {
-            let remedy = "this version knows only \"simulated\"";
-            return Err(BadValue::new("camera.backend", file.camera.backend, remedy));
-        }
         let mode = match file.daemon.mode.as_str() {
             "auto" => Mode::Auto,
             "manual" => Mode::Manual,
@@ -194,6 +180,7 @@ impl Config {
             mode,
             lens_poll: BadValue::duration("lens.poll_ms", file.lens.poll_ms, 1e-3, 0.5, 1000.0)?,
             lens_backlash: BadValue::check("lens.backlash_counts", file.lens.backlash_counts, 0.0, 1e6)?,
+            camera: file.camera.camera()?,
             lens_min: file.lens.min_counts.map(LensPosition),
             lens_max: file.lens.max_counts.map(LensPosition),
             rig: file.simulation.rig(lens.emulated().as_ref())?,
@@ -204,7 +191,8 @@ impl Config {
         // first run.
         if let Some(lens) = config.lens.expected(&config.rig) {
             let controller = config.controller(&lens)?;
-            FocusRequest::default().resolve(&controller, config.rig.sensor.geometry).map_err(|refusal| {
+            let geometry = config.camera.geometry(config.rig.sensor.geometry);
+            FocusRequest::default().resolve(&controller, geometry).map_err(|refusal| {
                 let is_interval = matches!(refusal, Refusal::Interval { .. });
                 let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
                 BadValue::new(key, "not fit for a default run", refusal.to_string())

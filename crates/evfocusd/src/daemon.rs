@@ -10,11 +10,12 @@ use evfocus_core::controller::{Command as CoreCommand, Mode};
 use evfocus_core::{Controller, EventBatch, RunId};
 use evfocus_hal::{CameraInfo, Clock, LensInfo, SystemClock};
 use evfocus_ipc::server::Limits;
-use evfocus_ipc::{self as ipc, Device, DeviceRole, DeviceState, Error, Report, Status};
+use evfocus_ipc::{self as ipc, Device, Error, Report, Status};
 use rtrb::RingBuffer;
 use tokio::sync::{broadcast, mpsc, watch};
 
-use crate::config::{Config, LensBackend};
+use crate::config::{CameraConfig, Config};
+use crate::device_list::DeviceList;
 use crate::devices::{self, Devices};
 use crate::handle::{Handle, Lookups};
 use crate::publisher::{Constants, PROGRESS, Publisher, Reports};
@@ -50,7 +51,7 @@ pub async fn run(
         .with_context(|| format!("cannot listen on {}", config.socket.display()))?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
     let devices = Devices::open(&config, &clock)?;
-    if config.rig.sensor.geometry.pixels() > 200_000 {
+    if config.camera == CameraConfig::Simulated && config.rig.sensor.geometry.pixels() > 200_000 {
         tracing::warn!(
             "the simulated IMX636 is several times slower than real time, so runs will time out; use davis346 here"
         );
@@ -169,9 +170,7 @@ impl Running {
         let lens = spawn("evfocus-lens", &ended_in, move || lens.run())?;
 
         let lookups = DaemonLookups {
-            camera: camera_info,
-            lens: lens_info,
-            backend: config.lens.clone(),
+            devices: DeviceList::new(config, camera_info, lens_info),
             reports: store.clone(),
             status: status_out.clone(),
         };
@@ -270,9 +269,7 @@ fn spawn(
 
 /// What clients may look up without the control thread.
 struct DaemonLookups {
-    camera: CameraInfo,
-    lens: LensInfo,
-    backend: LensBackend,
+    devices: DeviceList,
     reports: Reports,
     status: watch::Receiver<Arc<Status>>,
 }
@@ -280,30 +277,7 @@ struct DaemonLookups {
 impl Lookups for DaemonLookups {
     fn devices(&self) -> Result<Vec<Device>, Error> {
         let status = Arc::clone(&self.status.borrow());
-        let device =
-            |role, (driver, location): (&str, &str), model: &str, serial: &str, is_there: bool| Device {
-                role,
-                driver: driver.to_owned(),
-                model: model.to_owned(),
-                serial: serial.to_owned(),
-                location: location.to_owned(),
-                state: if is_there { DeviceState::Active } else { DeviceState::Missing },
-                message: if is_there { None } else { status.fault.clone() },
-            };
-        let simulated = ("simulated", "simulated");
-        let lens = (self.backend.name(), self.backend.location());
-        let mut devices = vec![
-            device(
-                DeviceRole::Camera,
-                simulated,
-                &self.camera.model,
-                &self.camera.serial,
-                status.camera.is_some(),
-            ),
-            device(DeviceRole::Lens, lens, &self.lens.model, &self.lens.serial, status.lens.is_some()),
-        ];
-        devices.extend(devices::free_ports(self.backend.location()));
-        Ok(devices)
+        Ok(self.devices.list(&status))
     }
 
     fn report(&self, id: Option<u64>) -> Result<Report, Error> {

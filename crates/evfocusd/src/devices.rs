@@ -3,13 +3,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use evfocus_camera::davis346::Davis346;
+use evfocus_camera::evk4::Evk4;
+use evfocus_camera::usb::{self, NusbTransport};
+use evfocus_camera::{Driver, ReopeningCamera};
 use evfocus_core::controller::{Action, DeviceFailure};
 use evfocus_hal::{Camera, Clock, DeviceError, DeviceErrorKind, Lens};
 use evfocus_ipc::{Device, DeviceRole, DeviceState};
 use evfocus_lens::{Firmata, Grbl, Indi, LabJack, MoonLite, Optotune, Port, UsbPort};
 use rustix::fs::Access;
 
-use crate::config::{Config, LensBackend, LensDriver, LensPlace};
+use crate::config::{CameraConfig, Config, LensBackend, LensDriver, LensPlace};
 
 /// A camera and a lens that belong together.
 pub struct Devices {
@@ -32,11 +36,23 @@ impl Devices {
     /// Opens the devices that `config` names; simulated and emulated ones live on `clock`.
     ///
     /// # Errors
-    /// [`OpenError`], with what to do about it.
+    /// [`OpenError`] with what helps.
     pub fn open(config: &Config, clock: &Arc<dyn Clock>) -> Result<Self, OpenError> {
         let rig = hil_sim::Rig::new(config.rig.clone(), Arc::clone(clock))?;
-        let (camera, _) = rig.devices();
-        Ok(Self { camera: Box::new(camera), lens: open_lens(&config.lens, &rig, clock)? })
+        let camera = match config.camera.clone() {
+            CameraConfig::Simulated => Box::new(rig.devices().0),
+            CameraConfig::Davis346 { serial, settings } => {
+                open_usb(Driver::Davis346, serial, clock, move |transport, clock| {
+                    Ok(Box::new(Davis346::open(transport, &settings, clock)?))
+                })?
+            }
+            CameraConfig::Evk4 { serial, settings } => {
+                open_usb(Driver::Evk4, serial, clock, move |transport, clock| {
+                    Ok(Box::new(Evk4::open(transport, &settings, clock)?))
+                })?
+            }
+        };
+        Ok(Self { camera, lens: open_lens(&config.lens, &rig, clock)? })
     }
 }
 
@@ -46,7 +62,7 @@ pub enum OpenError {
     /// The simulated rig makes no sense.
     #[error(transparent)]
     Rig(#[from] hil_sim::ConfigError),
-    /// The device does not open.
+    /// A device cannot be opened.
     #[error(transparent)]
     Device(#[from] DeviceError),
 }
@@ -96,6 +112,24 @@ pub(crate) fn free_ports(used: &str) -> Vec<Device> {
         }
     });
     devices.collect()
+}
+
+/// Opens the camera of `driver` with `serial`, or the only one; and the same one again whenever it comes back.
+fn open_usb(
+    driver: Driver,
+    serial: Option<String>,
+    clock: &Arc<dyn Clock>,
+    set_up: impl Fn(NusbTransport, Arc<dyn Clock>) -> Result<Box<dyn Camera>, DeviceError> + Send + 'static,
+) -> Result<Box<dyn Camera>, DeviceError> {
+    let (clock, mut serial) = (Arc::clone(clock), serial);
+    let camera = ReopeningCamera::new(move || {
+        let transport = usb::open(driver, serial.as_deref(), Arc::clone(&clock))?;
+        let camera = set_up(transport, Arc::clone(&clock))?;
+        // Another camera of its kind is not the one that was unplugged.
+        serial = Some(camera.info().serial);
+        Ok(camera)
+    })?;
+    Ok(Box::new(camera))
 }
 
 /// Model and serial, as reports name a device.

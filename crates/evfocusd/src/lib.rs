@@ -5,6 +5,7 @@
 pub mod arguments;
 pub mod config;
 pub mod daemon;
+mod device_list;
 pub mod devices;
 pub mod handle;
 pub mod logging;

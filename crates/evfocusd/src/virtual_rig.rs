@@ -39,7 +39,7 @@ pub enum VirtualRigError {
 pub struct VirtualRig {
     clock: Arc<VirtualClock>,
     rig: hil_sim::Rig,
-    camera: hil_sim::SimCamera,
+    camera: Box<dyn Camera>,
     lens: Box<dyn Lens>,
     controller: Controller,
     batch: EventBatch,
@@ -62,9 +62,20 @@ impl VirtualRig {
     /// # Errors
     /// [`VirtualRigError`] if the configuration makes no sense or a device does not start.
     pub fn new(config: &Config) -> Result<Self, VirtualRigError> {
+        Self::with_camera(config, |rig, _| Ok(Box::new(rig.devices().0)))
+    }
+
+    /// The rig of `config`, seen through the camera that `open` makes of it: a driver and an emulated device, say.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_camera(
+        config: &Config,
+        open: impl FnOnce(&hil_sim::Rig, Arc<dyn Clock>) -> Result<Box<dyn Camera>, DeviceError>,
+    ) -> Result<Self, VirtualRigError> {
         let clock = Arc::new(VirtualClock::new());
         let rig = hil_sim::Rig::new(config.rig.clone(), clock.clone())?;
-        let (mut camera, _) = rig.devices();
+        let mut camera = open(&rig, clock.clone())?;
         let shared: Arc<dyn Clock> = clock.clone();
         let lens = devices::open_lens(&config.lens, &rig, &shared)?;
         camera.start()?;

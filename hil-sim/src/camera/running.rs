@@ -86,6 +86,11 @@ impl Running {
         self.outbox.is_empty()
     }
 
+    /// The camera time up to which the stream has been computed.
+    pub(super) fn reached(&self) -> CameraMicros {
+        self.reached
+    }
+
     /// When the transfer of the coming step arrives.
     pub(super) fn arrival(&self) -> HostMicros {
         self.arrival

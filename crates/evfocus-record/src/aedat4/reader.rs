@@ -5,13 +5,13 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 
-use evfocus_core::{CameraMicros, Event, EventBatch, Geometry, Polarity};
+use evfocus_core::{CameraMicros, Damage, Event, EventBatch, Geometry, Polarity};
 
 use super::compression::Compression;
 use super::description::{EventStream, first_event_stream};
 use super::flatbuffer::Table;
 use super::{EVENT_BYTES, MAX_DESCRIPTION_BYTES, MAX_PACKET_BYTES, PACKET_HEADER_BYTES, VERSION_LINE};
-use crate::{Damage, Format, MAX_EVENTS_PER_READ, RecordError};
+use crate::{Format, MAX_EVENTS_PER_READ, RecordError};
 
 /// The first stream of events of a file; its other streams are passed over.
 #[derive(Debug)]

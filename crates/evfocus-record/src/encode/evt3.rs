@@ -1,10 +1,10 @@
 //! Events as EVT 3.0 words (Prophesee, "EVT 3.0 Format").
 
+use evfocus_core::decode::Evt3Decoder;
+use evfocus_core::decode::evt3::{POLARITY_BIT, TIME_PERIOD_US, word_type};
 use evfocus_core::{CameraMicros, Event, Geometry, Polarity};
 
 use super::EncodeError;
-use crate::decode::Evt3Decoder;
-use crate::decode::evt3::{POLARITY_BIT, TIME_PERIOD_US, WordType};
 
 /// Pixels that one vector of three words (12, 12 and 8) covers.
 const VECTOR_PIXELS: u16 = 32;
@@ -104,7 +104,7 @@ impl Evt3Encoder {
             self.tell_time(event.t.0, out)?;
             if self.row != Some(event.y) {
                 self.row = Some(event.y);
-                put(out, WordType::ADDR_Y, event.y);
+                put(out, word_type::ADDR_Y, event.y);
             }
         }
         self.run = Some(Run { base: event.x, polarity: event.polarity, valid: 1 });
@@ -129,15 +129,15 @@ impl Evt3Encoder {
         // A vector must not reach beyond the sensor, even with pixels that are not valid.
         let fits = run.base + VECTOR_PIXELS <= self.geometry.width;
         if run.valid.count_ones() > VECTOR_WORDS && fits {
-            put(out, WordType::VECT_BASE_X, run.base | polarity);
-            put(out, WordType::VECT_12, (run.valid & 0xFFF) as u16);
-            put(out, WordType::VECT_12, ((run.valid >> 12) & 0xFFF) as u16);
-            put(out, WordType::VECT_8, (run.valid >> 24) as u16);
+            put(out, word_type::VECT_BASE_X, run.base | polarity);
+            put(out, word_type::VECT_12, (run.valid & 0xFFF) as u16);
+            put(out, word_type::VECT_12, ((run.valid >> 12) & 0xFFF) as u16);
+            put(out, word_type::VECT_8, (run.valid >> 24) as u16);
             return;
         }
         let mut valid = run.valid;
         while valid != 0 {
-            put(out, WordType::ADDR_X, (run.base + valid.trailing_zeros() as u16) | polarity);
+            put(out, word_type::ADDR_X, (run.base + valid.trailing_zeros() as u16) | polarity);
             valid &= valid - 1;
         }
     }
@@ -173,16 +173,16 @@ impl Evt3Encoder {
         self.repeated = repeated;
         if self.low != Some(low) {
             self.low = Some(low);
-            put(out, WordType::TIME_LOW, low);
+            put(out, word_type::TIME_LOW, low);
         }
         Ok(())
     }
 }
 
 fn put_time_high(out: &mut Vec<u8>, high: i64) {
-    put(out, WordType::TIME_HIGH, (high & 0xFFF) as u16);
+    put(out, word_type::TIME_HIGH, (high & 0xFFF) as u16);
 }
 
-fn put(out: &mut Vec<u8>, word_type: u16, payload: u16) {
-    out.extend_from_slice(&(word_type << 12 | payload).to_le_bytes());
+fn put(out: &mut Vec<u8>, kind: u16, payload: u16) {
+    out.extend_from_slice(&(kind << 12 | payload).to_le_bytes());
 }

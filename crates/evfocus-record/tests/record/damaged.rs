@@ -2,47 +2,13 @@
 
 use std::path::Path;
 
-use evfocus_core::{CameraMicros, EventBatch, Geometry};
-use evfocus_record::decode::{DavisWordDecoder, Evt2Decoder, Evt3Decoder};
+use evfocus_core::EventBatch;
 use evfocus_record::{Format, MAX_EVENTS_PER_READ, Recording, Summary};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
 use crate::common::{data, file};
-
-const SENSOR: Geometry = Geometry { width: 640, height: 480 };
-
-/// Cuts `bytes` at the places given and feeds the pieces.
-fn in_pieces(bytes: &[u8], cuts: &[Index], mut feed: impl FnMut(&[u8])) {
-    let mut places: Vec<usize> = cuts.iter().map(|cut| cut.index(bytes.len() + 1)).collect();
-    places.sort_unstable();
-    let mut start = 0;
-    for place in places {
-        feed(&bytes[start..place]);
-        start = place;
-    }
-    feed(&bytes[start..]);
-}
-
-/// The whole and the pieces must give the same events, the same damage, and events on the sensor only.
-macro_rules! splitting_changes_nothing {
-    ($new:expr, $geometry:expr, $bytes:expr, $cuts:expr) => {{
-        let (mut whole, mut decoder) = (EventBatch::default(), $new);
-        decoder.decode($bytes, &mut whole);
-        decoder.finish();
-        let (mut pieces, mut piecewise) = (EventBatch::default(), $new);
-        in_pieces($bytes, $cuts, |piece| piecewise.decode(piece, &mut pieces));
-        piecewise.finish();
-        prop_assert_eq!(&whole.events, &pieces.events);
-        prop_assert_eq!(whole.reached, pieces.reached);
-        prop_assert_eq!(whole.lost, pieces.lost);
-        prop_assert_eq!(decoder.damage(), piecewise.damage());
-        prop_assert_eq!(decoder.triggers(), piecewise.triggers());
-        prop_assert!(whole.events.iter().all(|event| $geometry.contains(event.x, event.y)));
-        prop_assert!(whole.events.len() <= $bytes.len() * Evt3Decoder::MAX_EVENTS_PER_BYTE);
-    }};
-}
 
 /// Reads a file to its end or to an error; either is fine.
 fn ends(path: &Path, format: Option<Format>) {
@@ -69,21 +35,6 @@ fn real() -> impl Strategy<Value = Vec<u8>> {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
-
-    #[test]
-    fn evt3_in_pieces(bytes in vec(any::<u8>(), 0..4000), cuts in vec(any::<Index>(), 0..8)) {
-        splitting_changes_nothing!(Evt3Decoder::new(SENSOR), SENSOR, &bytes, &cuts);
-    }
-
-    #[test]
-    fn evt2_in_pieces(bytes in vec(any::<u8>(), 0..4000), cuts in vec(any::<Index>(), 0..8)) {
-        splitting_changes_nothing!(Evt2Decoder::with_origin(SENSOR, CameraMicros(0)), SENSOR, &bytes, &cuts);
-    }
-
-    #[test]
-    fn davis_words_in_pieces(bytes in vec(any::<u8>(), 0..4000), cuts in vec(any::<Index>(), 0..8)) {
-        splitting_changes_nothing!(DavisWordDecoder::new(), DavisWordDecoder::GEOMETRY, &bytes, &cuts);
-    }
 
     #[test]
     fn arbitrary_bytes_as_any_format(bytes in vec(any::<u8>(), 0..2000), format in prop::sample::select(Format::ALL.to_vec())) {

@@ -1,7 +1,7 @@
 //! What is written comes back the same: events, order, times, whatever the gaps and the origin.
 
+use evfocus_core::decode::Evt3Decoder;
 use evfocus_core::{CameraMicros, Event, Geometry};
-use evfocus_record::decode::Evt3Decoder;
 use evfocus_record::encode::{EncodeError, Evt3Encoder};
 use evfocus_record::{
     Aedat4Compression, Aedat4Writer, CsvWriter, Evt3Writer, RecordError, Recording, Summary,

@@ -1,6 +1,8 @@
 //! Tests of evfocus-record from outside, in one binary.
 
 #[cfg(test)]
+mod chunks;
+#[cfg(test)]
 mod common;
 #[cfg(test)]
 mod csv;
@@ -16,5 +18,3 @@ mod positions;
 mod recordings;
 #[cfg(test)]
 mod summary;
-#[cfg(test)]
-mod words;

@@ -7,7 +7,7 @@ pub struct Damage {
     pub events_before_time: u64,
     /// Events before the first row, column or vector base that they need.
     pub events_before_address: u64,
-    /// Events (or rows of the DAVIS346) with a coordinate that the sensor does not have.
+    /// Events with a coordinate that the sensor does not have.
     pub outside_sensor: u64,
     /// Steps of the camera's time that are neither 0 nor 1 of its coarse unit: data was lost there.
     pub time_jumps: u64,

@@ -1,9 +1,11 @@
 //! EVT 2.0: 32-bit words, little-endian, the type in bits 31 to 28 (Prophesee, "EVT 2.0 Format"; the wrap as in OpenEB).
 
-use evfocus_core::{CameraMicros, Event, EventBatch, Geometry, Polarity};
+use alloc::vec::Vec;
 
 use super::framing::Framing;
-use crate::Damage;
+use crate::damage::Damage;
+use crate::event::{Event, EventBatch, Geometry, Polarity};
+use crate::units::CameraMicros;
 
 /// The type of a word, bits 31 to 28.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,15 +1,14 @@
 //! The rules of decoding, word by word.
 
-use evfocus_core::{CameraMicros, EventBatch, Geometry};
-use evfocus_record::Damage;
-use evfocus_record::decode::{DavisWordDecoder, Evt2Decoder, Evt3Decoder};
+use evfocus_core::decode::{DavisWordDecoder, Evt2Decoder, Evt3Decoder, RESTART_LEAP_US};
+use evfocus_core::{CameraMicros, Damage, EventBatch, Geometry};
 
-use crate::common::event;
+use crate::common::{bytes_of, event};
 
 const SENSOR: Geometry = Geometry { width: 1280, height: 720 };
 
 fn evt3(words: &[u16]) -> (EventBatch, Evt3Decoder) {
-    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let bytes = bytes_of(words);
     let (mut batch, mut decoder) = (EventBatch::default(), Evt3Decoder::new(SENSOR));
     decoder.decode(&bytes, &mut batch);
     decoder.finish();
@@ -17,7 +16,7 @@ fn evt3(words: &[u16]) -> (EventBatch, Evt3Decoder) {
 }
 
 fn davis(words: &[u16]) -> (EventBatch, DavisWordDecoder) {
-    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let bytes = bytes_of(words);
     let (mut batch, mut decoder) = (EventBatch::default(), DavisWordDecoder::new());
     decoder.decode(&bytes, &mut batch);
     (batch, decoder)
@@ -123,6 +122,36 @@ fn davis_drops_addresses_beyond_the_sensor() {
     // Row 346 and its column, row 0, column 260, column 259; external pulse.
     let (batch, decoder) = davis(&[0x8005, 0x115A, 0x2000, 0x1000, 0x2104, 0x2103, 0x0004]);
     assert_eq!(batch.events, [event(5, 0, 259, false)]);
-    assert_eq!((decoder.damage().outside_sensor, decoder.damage().events_before_address), (2, 1));
+    assert_eq!((decoder.damage().outside_sensor, batch.lost), (2, 2));
     assert_eq!(decoder.triggers(), 1);
+}
+
+#[test]
+fn live_times_never_go_back() {
+    let times = |batch: &EventBatch| batch.events.iter().map(|event| event.t.0).collect::<Vec<_>>();
+    let mut batch = EventBatch::default();
+    // EVT3: a fine time that falls is held; a coarse one that falls is a restart of the camera's clock.
+    let mut decoder = Evt3Decoder::live(SENSOR);
+    let words = [0x0001, 0x8064, 0x6009, 0x2001, 0x6005, 0x2001, 0x8060, 0x2001, 0x8061, 0x2001];
+    decoder.decode(&bytes_of(&words), &mut batch);
+    let first = (100 << 12) + 9;
+    let restart = first + RESTART_LEAP_US;
+    assert_eq!(times(&batch), [first, first, restart, restart + 4096]);
+    assert_eq!((decoder.damage().timestamp_resets, decoder.damage().time_jumps), (1, 1));
+    // DAVIS: a time that falls means that a wrap word was lost; a reset leaps.
+    let mut decoder = DavisWordDecoder::live();
+    batch.clear();
+    let words = [0x8009, 0x1001, 0x2001, 0x8005, 0x2001, 0x0001, 0x2001, 0x8007, 0x2001, 0x7002, 0x2001];
+    decoder.decode(&bytes_of(&words), &mut batch);
+    let restart = (1 << 15) + 5 + RESTART_LEAP_US;
+    assert_eq!(times(&batch), [9, (1 << 15) + 5, restart, restart + 7, restart + (2 << 15)]);
+    assert_eq!((decoder.damage().timestamp_resets, decoder.damage().time_jumps), (1, 2));
+}
+
+#[test]
+fn four_thousand_wraps_in_a_row_are_that_much_time() {
+    let (batch, _) = davis(&[0x7001; 4096]);
+    assert_eq!(batch.reached, Some(CameraMicros(4096 << 15)));
+    let (batch, decoder) = davis(&[0x7FFF, 0x8001]);
+    assert_eq!((batch.reached, decoder.damage().time_jumps), (Some(CameraMicros((4095 << 15) + 1)), 1));
 }

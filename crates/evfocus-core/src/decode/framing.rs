@@ -13,7 +13,12 @@ impl<const N: usize> Framing<N> {
     }
 
     /// Calls `word` for each word that `bytes` completes.
-    pub(super) fn feed(&mut self, mut bytes: &[u8], mut word: impl FnMut([u8; N])) {
+    pub(super) fn feed(&mut self, bytes: &[u8], mut word: impl FnMut([u8; N])) {
+        self.feed_slices(bytes, |words| words.iter().for_each(|&bytes| word(bytes)));
+    }
+
+    /// Calls `take` with the words that `bytes` completes, in one slice or two.
+    pub(super) fn feed_slices(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[[u8; N]])) {
         if self.held > 0 {
             let (first, rest) = bytes.split_at(bytes.len().min(N - self.held));
             for (slot, &byte) in self.partial.iter_mut().skip(self.held).zip(first) {
@@ -25,12 +30,10 @@ impl<const N: usize> Framing<N> {
                 return;
             }
             self.held = 0;
-            word(self.partial);
+            take(&[self.partial]);
         }
         let (words, rest) = bytes.as_chunks::<N>();
-        for &bytes in words {
-            word(bytes);
-        }
+        take(words);
         for (slot, &byte) in self.partial.iter_mut().zip(rest) {
             *slot = byte;
         }

@@ -1,10 +1,19 @@
 //! The 16-bit words of a DAVIS346's USB stream, little-endian (iniVation's logic for the FX3 boards; rules as in libcaer's
 //! `davis_common`): bit 15 marks a time, else bits 14 to 12 say what bits 11 to 0 are.
 
-use evfocus_core::{CameraMicros, Event, EventBatch, Geometry, Polarity};
+mod counter;
+mod time;
 
+pub use counter::DavisWordCounter;
+
+use alloc::vec::Vec;
+
+use super::TimeRule;
 use super::framing::Framing;
-use crate::Damage;
+use crate::damage::Damage;
+use crate::event::{Event, EventBatch, Geometry, Polarity};
+use crate::units::CameraMicros;
+use time::DavisTime;
 
 /// One word, taken apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +32,13 @@ enum Word {
     Wrap(u16),
 }
 
+/// Bits 11 to 0: what a word's code is about.
+const DATA_MASK: u16 = 0x0FFF;
+/// Of a column word: brighter.
+const POLARITY_BIT: u16 = 0x1000;
+/// Bits 15 to 13 of a column word.
+const COLUMN_KIND: u16 = 1;
+
 /// The special words that matter here; the others belong to frames and the inertial unit.
 mod special {
     pub(super) const RESERVED: u16 = 0;
@@ -37,25 +53,18 @@ impl Word {
         if word & 0x8000 != 0 {
             return Self::Time(word & 0x7FFF);
         }
-        let data = word & 0x0FFF;
+        let data = word & DATA_MASK;
         match word >> 12 {
             0 => Self::Special(data),
             1 => Self::Row(data),
-            2 => Self::Column(data, Polarity::Off),
-            3 => Self::Column(data, Polarity::On),
+            2 | 3 => Self::Column(data, Polarity::from_on(word & POLARITY_BIT != 0)),
             7 => Self::Wrap(data),
             _ => Self::NoEvents,
         }
     }
 }
 
-/// Microseconds until the 15 bits of time wrap.
-const TIME_PERIOD_US: i64 = 1 << 15;
-
 /// Decodes the words of a DAVIS346 into events; frames and inertial data are passed over.
-///
-/// Times count from the camera's last timestamp reset. A reset in mid-stream starts them from zero again, as the camera
-/// does, and is counted.
 #[derive(Debug, Clone)]
 pub struct DavisWordDecoder {
     framing: Framing<2>,
@@ -64,30 +73,40 @@ pub struct DavisWordDecoder {
 
 #[derive(Debug, Clone)]
 struct State {
-    wraps_us: i64,
-    time: i64,
-    /// Whether any word has told the time.
-    time_known: bool,
+    time: DavisTime,
     /// Picture column of the events that follow.
-    column: Option<u16>,
+    column: Column,
     triggers: u64,
     damage: Damage,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Column {
+    None,
+    At(u16),
+    /// The column before would be a guess.
+    OutsideSensor,
 }
 
 impl DavisWordDecoder {
     /// The sensor of the DAVIS346.
     pub const GEOMETRY: Geometry = Geometry { width: 346, height: 260 };
+    /// The most events that a word of two bytes can hold.
+    pub const MAX_EVENTS_PER_WORD: usize = 1;
 
-    /// A decoder at the start of a stream.
+    /// A decoder for a recording. Times count from the camera's last timestamp reset; one in mid-stream starts them from zero
+    /// again, as the camera does.
     pub fn new() -> Self {
-        let state = State {
-            wraps_us: 0,
-            time: 0,
-            time_known: false,
-            column: None,
-            triggers: 0,
-            damage: Damage::default(),
-        };
+        Self::with_time(DavisTime::new(TimeRule::AsSent))
+    }
+
+    /// A decoder for a live camera: time never goes back.
+    pub fn live() -> Self {
+        Self::with_time(DavisTime::new(TimeRule::Ascending))
+    }
+
+    fn with_time(time: DavisTime) -> Self {
+        let state = State { time, column: Column::None, triggers: 0, damage: Damage::default() };
         Self { framing: Framing::new(), state }
     }
 
@@ -95,9 +114,9 @@ impl DavisWordDecoder {
     pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         let state = &mut self.state;
         let dropped = state.damage.events_before_address + state.damage.outside_sensor;
-        self.framing.feed(bytes, |word| state.word(u16::from_le_bytes(word), &mut batch.events));
+        self.framing.feed_slices(bytes, |words| state.words(words, &mut batch.events));
         batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
-        batch.reached = state.time_known.then_some(CameraMicros(state.time)).or(batch.reached);
+        batch.reached = state.time.now().map(CameraMicros).or(batch.reached);
     }
 
     /// Says that the stream has ended, so that a partial word counts as damage.
@@ -107,7 +126,8 @@ impl DavisWordDecoder {
 
     /// What was found wrong so far.
     pub fn damage(&self) -> Damage {
-        self.state.damage
+        let time = &self.state.time;
+        Damage { time_jumps: time.jumps, timestamp_resets: time.restarts, ..self.state.damage }
     }
 
     /// Edges and pulses at the external input so far.
@@ -123,35 +143,34 @@ impl Default for DavisWordDecoder {
 }
 
 impl State {
-    fn word(&mut self, word: u16, events: &mut Vec<Event>) {
-        match Word::of(word) {
-            Word::Time(low) => self.set_time(i64::from(low)),
-            Word::Row(row) => self.row(row),
-            Word::Column(column, polarity) => self.event(column, polarity, events),
-            Word::Special(signal) => self.special(signal),
-            Word::NoEvents => {}
-            Word::Wrap(times) => {
-                // More than one: the camera counted wraps while nobody read from it.
-                self.wraps_us = self.wraps_us.saturating_add(i64::from(times) * TIME_PERIOD_US);
-                self.damage.time_jumps += u64::from(times != 1);
-                self.set_time(0);
+    fn words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
+        while let Some((&first, rest)) = words.split_first() {
+            let word = Word::of(u16::from_le_bytes(first));
+            if !matches!(word, Word::Column(..)) {
+                self.word(word);
+                words = rest;
+                continue;
             }
+            // Events come in runs of one row and time, which are written without looking again.
+            let (columns, rest) = words.split_at(words.iter().take_while(|word| is_column(**word)).count());
+            self.columns(columns, events);
+            words = rest;
         }
     }
 
-    fn set_time(&mut self, low: i64) {
-        self.time = self.wraps_us.saturating_add(low);
-        self.time_known = true;
+    fn word(&mut self, word: Word) {
+        match word {
+            Word::Time(low) => self.time.low(low),
+            Word::Row(row) => self.row(row),
+            Word::Special(signal) => self.special(signal),
+            Word::NoEvents | Word::Column(..) => {}
+            Word::Wrap(times) => self.time.wrap(times),
+        }
     }
 
     fn special(&mut self, signal: u16) {
         match signal {
-            special::TIMESTAMP_RESET => {
-                // The reset at the start of a stream is how it begins, not damage.
-                self.damage.timestamp_resets += u64::from(self.time > 0);
-                self.wraps_us = 0;
-                self.set_time(0);
-            }
+            special::TIMESTAMP_RESET => self.time.reset(),
             special::EXTERNAL_FALLING..=special::EXTERNAL_PULSE => self.triggers += 1,
             special::RESERVED => self.damage.unknown_words += 1,
             signal if signal > special::LAST => self.damage.unknown_words += 1,
@@ -160,33 +179,45 @@ impl State {
     }
 
     fn row(&mut self, row: u16) {
-        if row < DavisWordDecoder::GEOMETRY.width {
-            self.column = Some(row);
-        } else {
-            // The events that follow belong to no column that exists; the column before would be a guess.
-            self.column = None;
-            self.damage.outside_sensor += 1;
-        }
+        let exists = row < DavisWordDecoder::GEOMETRY.width;
+        self.column = if exists { Column::At(row) } else { Column::OutsideSensor };
     }
 
-    fn event(&mut self, y: u16, polarity: Polarity, events: &mut Vec<Event>) {
-        let Some(x) = self.column else {
-            self.damage.events_before_address += 1;
-            return;
+    /// Words of which each is an event of the same time and row.
+    fn columns(&mut self, words: &[[u8; 2]], events: &mut Vec<Event>) {
+        let all = words.len() as u64;
+        let (t, x) = match (self.time.now(), self.column) {
+            (Some(t), Column::At(x)) => (CameraMicros(t), x),
+            (None, _) => return self.damage.events_before_time += all,
+            (Some(_), Column::None) => return self.damage.events_before_address += all,
+            (Some(_), Column::OutsideSensor) => return self.damage.outside_sensor += all,
         };
-        if !self.time_known {
-            self.damage.events_before_time += 1;
-        } else if y < DavisWordDecoder::GEOMETRY.height {
-            events.push(Event { t: CameraMicros(self.time), x, y, polarity });
+        let row = |bytes: &[u8; 2]| u16::from_le_bytes(*bytes) & DATA_MASK;
+        let event = |bytes: &[u8; 2]| Event {
+            t,
+            x,
+            y: row(bytes),
+            polarity: Polarity::from_on(u16::from_le_bytes(*bytes) & POLARITY_BIT != 0),
+        };
+        let exists = |bytes: &&[u8; 2]| row(bytes) < DavisWordDecoder::GEOMETRY.height;
+        if words.iter().all(|bytes| exists(&bytes)) {
+            events.extend(words.iter().map(event));
         } else {
-            self.damage.outside_sensor += 1;
+            let before = events.len();
+            events.extend(words.iter().filter(exists).map(event));
+            self.damage.outside_sensor += all - (events.len() - before) as u64;
         }
     }
 }
 
+/// Whether a word is a column, of either polarity.
+fn is_column(bytes: [u8; 2]) -> bool {
+    u16::from_le_bytes(bytes) >> 13 == COLUMN_KIND
+}
+
 /// Whether `bytes`, the start of a file, could be nothing but DAVIS346 words: every word is one that the camera sends, all
 /// addresses exist, time never goes back between wraps, and there are events. Chance passes this for no more than a few words.
-pub(crate) fn looks_like_davis_words(bytes: &[u8]) -> bool {
+pub fn looks_like_davis_words(bytes: &[u8]) -> bool {
     let mut last_time = 0;
     let (mut times, mut events) = (0, 0);
     for &word in bytes.as_chunks::<2>().0 {

@@ -1,0 +1,95 @@
+//! Counting straight from the words counts what decoding decodes.
+
+use std::collections::BTreeMap;
+
+use evfocus_core::decode::{DavisWordCounter, DavisWordDecoder, Evt3Counter, Evt3Decoder};
+use evfocus_core::{CameraMicros, EventBatch};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::sample::Index;
+
+use crate::common::{bytes_of, in_pieces};
+
+/// Events by bin.
+type Bins = BTreeMap<i64, u64>;
+
+/// The decoded events by bin; the lost ones are those whose bin nobody knows.
+fn decoded(batch: &EventBatch, bin_us: u32) -> (Bins, u64) {
+    let mut bins = Bins::new();
+    let bin_us = i64::from(bin_us);
+    for event in &batch.events {
+        *bins.entry(event.t.0.div_euclid(bin_us) * bin_us).or_default() += 1;
+    }
+    (bins, batch.lost)
+}
+
+/// Words as a camera might send them: mostly columns and vectors, times that mostly rise.
+fn evt3_word() -> impl Strategy<Value = u16> {
+    let of = |kind: u16| move |payload: u16| kind << 12 | payload & 0xFFF;
+    prop_oneof![
+        30 => any::<u16>().prop_map(of(0x2)),
+        20 => any::<u16>().prop_map(of(0x4)),
+        10 => any::<u16>().prop_map(of(0x5)),
+        8 => any::<u16>().prop_map(of(0x0)),
+        8 => (0..1_000_u16).prop_map(of(0x3)),
+        8 => (0..4096_u16).prop_map(of(0x6)),
+        3 => (100..104_u16).prop_map(of(0x8)),
+        1 => any::<u16>(),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    /// With a sensor that has every address, and a row and a base first, nothing is lost and every bin is the same.
+    #[test]
+    fn evt3_bins_are_equal(
+        words in vec(evt3_word(), 0..1500),
+        bin_us in prop_oneof![Just(1_u32), Just(20), 1..9000_u32],
+        cuts in vec(any::<Index>(), 0..4),
+    ) {
+        let mut bytes = bytes_of(&[0x0001, 0x3000]);
+        // A long run of vectors would leave even 2048 columns; a fresh base in between keeps them on the sensor.
+        bytes.extend(words.iter().flat_map(|&word| {
+            let vector = matches!(word >> 12, 0x4 | 0x5);
+            bytes_of(if vector { &[0x3000, 0] } else { &[0x1000, 0] }).into_iter().take(2).chain(word.to_le_bytes())
+        }));
+        let (mut batch, mut decoder) = (EventBatch::default(), Evt3Decoder::live(Evt3Decoder::MAX_GEOMETRY));
+        decoder.decode(&bytes, &mut batch);
+        let (mut bins, mut counter) = (Bins::new(), Evt3Counter::new(bin_us));
+        in_pieces(&bytes, &cuts, |piece| {
+            counter.count(piece, |CameraMicros(start), events| *bins.entry(start).or_default() += events);
+        });
+        let (expected, lost) = decoded(&batch, bin_us);
+        prop_assert_eq!(lost, 0);
+        prop_assert_eq!(bins, expected);
+        prop_assert_eq!(counter.reached(), batch.reached);
+    }
+
+    /// Whatever the bytes are, the total is what was decoded and what was dropped for its address.
+    #[test]
+    fn evt3_totals_are_equal(bytes in vec(any::<u8>(), 0..4000), cuts in vec(any::<Index>(), 0..8)) {
+        let (mut batch, mut decoder) = (EventBatch::default(), Evt3Decoder::live(Evt3Decoder::MAX_GEOMETRY));
+        decoder.decode(&bytes, &mut batch);
+        let (mut total, mut counter) = (0, Evt3Counter::new(20));
+        in_pieces(&bytes, &cuts, |piece| counter.count(piece, |_, events| total += events));
+        prop_assert_eq!(total, batch.events.len() as u64 + batch.lost);
+        prop_assert_eq!(counter.reached(), batch.reached);
+    }
+
+    /// The same for the DAVIS346; with nothing dropped, each bin is the same too.
+    #[test]
+    fn davis_counts_are_equal(bytes in vec(any::<u8>(), 0..4000), cuts in vec(any::<Index>(), 0..8)) {
+        let (mut batch, mut decoder) = (EventBatch::default(), DavisWordDecoder::live());
+        decoder.decode(&bytes, &mut batch);
+        let (mut bins, mut counter) = (Bins::new(), DavisWordCounter::new(20));
+        in_pieces(&bytes, &cuts, |piece| {
+            counter.count(piece, |CameraMicros(start), events| *bins.entry(start).or_default() += events);
+        });
+        let (expected, lost) = decoded(&batch, 20);
+        prop_assert_eq!(bins.values().sum::<u64>(), batch.events.len() as u64 + lost);
+        prop_assert!(expected.iter().all(|(start, events)| bins.get(start) >= Some(events)));
+        prop_assert!(lost > 0 || bins == expected);
+        prop_assert_eq!(counter.reached(), batch.reached);
+    }
+}
