@@ -172,11 +172,11 @@ pub fn is_at_edge(answer: LensPosition, range: LensRange, edge_share: f64) -> bo
 }
 
 fn by_structure_one_way(leg: &LegReport, rules: &Rules) -> Result<Answer, Failure> {
-    Ok(by_structure(Chosen::of(leg, rules)?.alone(rules)?, rules))
+    Ok(by_structure(&Chosen::of(leg, rules)?.alone(rules)?, rules))
 }
 
-fn by_structure(chosen: Chosen, rules: &Rules) -> Answer {
-    let Chosen { structure, position, second_depth, window, flags } = chosen;
+fn by_structure(chosen: &Chosen, rules: &Rules) -> Answer {
+    let Chosen { structure, position, second_depth, window, flags } = *chosen;
     let late = libm::fabs(structure.velocity) * chosen.delay(rules).uncertainty_s;
     Answer {
         second_depth: second_depth.map(|second| chosen.without_delay(second, rules)),

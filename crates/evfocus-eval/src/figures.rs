@@ -73,6 +73,8 @@ fn svg(draw: impl FnOnce(&Area<'_>) -> anyhow::Result<()>) -> anyhow::Result<Str
     Ok(text)
 }
 
+/// Abscissa and ordinate.
+type Points = Vec<(f64, f64)>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// A chart with its axes drawn. Without a title of the x axis there is room for names below it.
@@ -178,7 +180,7 @@ fn curves(result: &SequenceResult, area: &Area<'_>) -> anyhow::Result<()> {
 
 /// The golden search's mean error after each step.
 fn steps(results: &[SequenceResult], area: &Area<'_>) -> anyhow::Result<()> {
-    let lines: Vec<(Condition, Vec<(f64, f64)>, RGBColor)> = Condition::ALL
+    let lines: Vec<(Condition, Points, RGBColor)> = Condition::ALL
         .into_iter()
         .zip(CONDITIONS)
         .map(|(condition, color)| {
@@ -208,7 +210,7 @@ fn steps(results: &[SequenceResult], area: &Area<'_>) -> anyhow::Result<()> {
 }
 
 /// The mean over sequences after each step; one whose search is over keeps its last error.
-fn mean_by_step(errors: &[&[f64]]) -> Vec<(f64, f64)> {
+fn mean_by_step(errors: &[&[f64]]) -> Points {
     let longest = errors.iter().map(|errors| errors.len()).max().unwrap_or(0);
     (0..longest)
         .filter_map(|step| {

@@ -8,8 +8,8 @@ use std::io::{BufWriter, Write};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-use evfocus_core::Outcome;
 use evfocus_core::controller::Pace;
+use evfocus_core::{Flag, Outcome};
 use evfocus_tests::random_runs::{Ended, Trial, Verdict, run_all};
 
 type Run = (u64, Trial, Ended);
@@ -74,7 +74,7 @@ fn dump(path: &str, runs: &[Run]) -> Result<()> {
             "error_bar": answer.and_then(|answer| answer.error_bar),
             "confidence": answer.and_then(|answer| answer.confidence),
             "width": answer.and_then(|answer| answer.width),
-            "flags": answer.map(|answer| answer.flags.iter().map(|flag| flag.name()).collect::<Vec<_>>()),
+            "flags": answer.map(|answer| answer.flags.iter().map(Flag::name).collect::<Vec<_>>()),
             "legs": ended.report.sweeps().count(),
             "elapsed": ended.report.elapsed().as_secs_f64(),
             "sweeps": ended.report.sweeps().filter_map(|leg| leg.structure).map(|said| said.map_or_else(

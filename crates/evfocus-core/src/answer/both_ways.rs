@@ -31,24 +31,25 @@ pub(super) fn by_structure_both_ways(
         let is_clear = !there.structure.is_unsure && !back.structure.is_unsure;
         // A faint peak elsewhere is still a contradiction.
         if is_clear && together >= LEAST_TOGETHER {
-            return combine(there, back, rules);
+            return combine(&there, &back, rules);
         }
     }
     let [there, back] = alone;
     let (believed, failure) = match (there, back) {
         (Err(failure), Ok(back)) => (back, failure),
         (there, Err(failure)) => (there?, failure),
-        (Ok(there), Ok(back)) => return combine(there, back, rules),
+        (Ok(there), Ok(back)) => return combine(&there, &back, rules),
     };
     let flag = failure.doubt().ok_or(failure)?;
-    let mut answer = by_structure(believed, rules);
+    let mut answer = by_structure(&believed, rules);
     answer.flags.set(flag, true);
     Ok(answer)
 }
 
 /// Both answers together, each weighted by how sure it is of itself, and what is known of the delay beforehand. Of two that are
 /// equally sure it is the mean, from which the delay drops out.
-fn combine(there: Chosen, mut back: Chosen, rules: &Rules) -> Result<Answer, Failure> {
+fn combine(there: &Chosen, back: &Chosen, rules: &Rules) -> Result<Answer, Failure> {
+    let mut back = *back;
     // Which of two depths is the stronger may differ from one way to the other.
     if let Some(other) = back.second_depth
         && other.distance(there.position) < back.position.distance(there.position)
@@ -73,7 +74,7 @@ fn combine(there: Chosen, mut back: Chosen, rules: &Rules) -> Result<Answer, Fai
         });
     }
     let lag = Lag { counts: towards * speed * expected.seconds, uncertainty: speed * expected.uncertainty_s };
-    let fused = Fused::of(&there, &back, lag);
+    let fused = Fused::of(there, &back, lag);
     // What exceeds chance may be backlash, half of which stays in the mean.
     let beyond = (excess * excess - uncertainty * uncertainty).max(0.0) / 4.0;
     let second_depth = match (there.second_depth, back.second_depth) {
@@ -185,10 +186,10 @@ mod tests {
         };
         let back = way(940.0, 6.0, -1000.0).with_backlash(&rules);
         let there = way(1006.0, 6.0, 1000.0);
-        let answer = combine(there, back, &rules).unwrap();
+        let answer = combine(&there, &back, &rules).unwrap();
         assert!((answer.position.0 - 998.0).abs() < 1e-9, "{answer:?}");
         let unknown = Rules { backlash: 0.0, ..rules };
-        let refused = combine(way(1030.0, 3.0, 1000.0), way(940.0, 3.0, -1000.0), &unknown);
+        let refused = combine(&way(1030.0, 3.0, 1000.0), &way(940.0, 3.0, -1000.0), &unknown);
         let Err(Failure::DirectionMismatch { suspicion: Suspicion::Backlash { counts }, .. }) = refused
         else {
             panic!("{refused:?}")

@@ -85,7 +85,9 @@ impl StructureMeasure {
 
     /// Takes events made while the lens stands still before its sweep.
     pub fn observe_rest(&mut self, events: &[Event]) {
-        events.iter().for_each(|event| self.noise.take(event));
+        for event in events {
+            self.noise.take(event);
+        }
     }
 
     /// The lens is about to begin its sweep.
