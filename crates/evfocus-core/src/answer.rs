@@ -275,15 +275,15 @@ mod tests {
         }
     }
 
-    fn leg(structure: StructureAnswer) -> LegReport {
-        LegReport { structure: Some(Ok(structure)), ..LegReport::empty() }
+    fn leg(structure: &StructureAnswer) -> LegReport {
+        LegReport { structure: Some(Ok(*structure)), ..LegReport::empty() }
     }
 
     fn rules() -> Rules {
         Rules::for_range(LensRange::new(LensPosition(0.0), LensPosition(3500.0)).unwrap())
     }
 
-    fn both(there: StructureAnswer, back: StructureAnswer) -> Result<Answer, Failure> {
+    fn both(there: &StructureAnswer, back: &StructureAnswer) -> Result<Answer, Failure> {
         answer(&leg(there), Some(&leg(back)), Method::Auto, &rules())
     }
 
@@ -291,14 +291,14 @@ mod tests {
     fn two_weak_ways_that_agree_are_believed_and_one_is_not() {
         let (there, back) = (structure_answer(1006.0, 9.0, 1000.0), structure_answer(994.0, 9.0, -1000.0));
         let weak = |answer, significance| StructureAnswer { significance, ..answer };
-        let agreed = both(weak(there, 9.0), weak(back, 9.0)).unwrap();
+        let agreed = both(&weak(there, 9.0), &weak(back, 9.0)).unwrap();
         assert!((agreed.position.0 - 1000.0).abs() < 1.0 && agreed.flags.contains(Flag::Weak), "{agreed:?}");
-        let alone = answer(&leg(weak(there, 9.0)), None, Method::Auto, &rules());
+        let alone = answer(&leg(&weak(there, 9.0)), None, Method::Auto, &rules());
         assert!(matches!(alone, Err(Failure::Weak { .. })), "{alone:?}");
         let elsewhere = structure_answer(2500.0, 9.0, -1000.0);
-        let apart = both(weak(there, 9.0), elsewhere);
+        let apart = both(&weak(there, 9.0), &elsewhere);
         assert!(matches!(apart, Err(Failure::DirectionMismatch { .. })), "{apart:?}");
-        let too_faint = both(weak(there, 9.0), weak(back, 5.0));
+        let too_faint = both(&weak(there, 9.0), &weak(back, 5.0));
         assert!(matches!(too_faint, Err(Failure::Weak { .. })), "{too_faint:?}");
     }
 
@@ -306,9 +306,9 @@ mod tests {
     fn a_fairly_high_peak_is_believed_if_its_readings_agree() {
         let fair =
             |scatter| StructureAnswer { significance: 11.0, ..structure_answer(1006.0, scatter, 1000.0) };
-        let believed = answer(&leg(fair(12.0)), None, Method::Auto, &rules()).unwrap();
+        let believed = answer(&leg(&fair(12.0)), None, Method::Auto, &rules()).unwrap();
         assert!(believed.flags.contains(Flag::Weak), "{believed:?}");
-        let refused = answer(&leg(fair(60.0)), None, Method::Auto, &rules());
+        let refused = answer(&leg(&fair(60.0)), None, Method::Auto, &rules());
         assert!(matches!(refused, Err(Failure::Weak { .. })), "{refused:?}");
     }
 
@@ -318,7 +318,7 @@ mod tests {
         let unsure = |answer| StructureAnswer { is_unsure: true, ..answer };
         let far = |answer: StructureAnswer| StructureAnswer { position: LensPosition(3000.0), ..answer };
         for (there, back) in [(there, far(unsure(back))), (far(unsure(there)), back)] {
-            let found = both(there, back).unwrap();
+            let found = both(&there, &back).unwrap();
             assert!((found.position.0 - 1000.0).abs() < 1.0, "{found:?}");
             assert!(found.flags.contains(Flag::Unsure), "{found:?}");
         }
@@ -326,7 +326,7 @@ mod tests {
 
     #[test]
     fn what_is_highest_at_an_end_is_no_peak() {
-        let at_end = answer(&leg(structure_answer(3490.0, 9.0, 20_000.0)), None, Method::Auto, &rules());
+        let at_end = answer(&leg(&structure_answer(3490.0, 9.0, 20_000.0)), None, Method::Auto, &rules());
         assert!(matches!(at_end, Err(Failure::PeakAtEdge { .. })), "{at_end:?}");
     }
 }
