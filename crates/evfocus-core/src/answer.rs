@@ -227,13 +227,15 @@ fn by_other(
     })
 }
 
+/// More are as good as certainty, and their square is still a number.
+const MOST_DEVIATIONS: f64 = 1e6;
+
 /// The probability that an error stays within `tolerance`: Student's t with four degrees of freedom, whose tails are heavier than the
 /// normal distribution's as those of the errors are; and less where something is odd.
 fn confidence(error_bar: f64, flags: Flags, tolerance: f64) -> f64 {
-    if error_bar <= 0.0 {
-        return 1.0;
-    }
-    let t = tolerance / error_bar;
+    // Written so that an error bar that is no number is as good as none.
+    let t = if error_bar >= 0.0 { tolerance / error_bar.max(f64::MIN_POSITIVE) } else { 0.0 };
+    let t = t.min(MOST_DEVIATIONS);
     let u = t * t / (4.0 + t * t);
     let within = libm::sqrt(u) * (1.5 - 0.5 * u);
     let doubts = [

@@ -26,7 +26,7 @@ mod sweeping;
 
 pub use config::{ControllerConfig, OnFailure};
 pub use interface::{Action, DeviceFailure, FocusState, Input, Snapshot};
-pub use request::{Accepted, Command, FocusRequest, Mode, Pace, Refusal};
+pub use request::{Accepted, Command, FocusRequest, Mode, Pace, Refusal, check_windows};
 
 use alloc::vec::Vec;
 use core::time::Duration;

@@ -27,7 +27,7 @@ impl fmt::Display for RunId {
 pub enum Directions {
     /// From the low end to the high end only.
     Forward,
-    /// There and back; the answer is the mean of both, which cancels lag and backlash.
+    /// There and back; the answer is the mean of both, each weighted by how sure it is, which cancels the lag.
     Both,
 }
 

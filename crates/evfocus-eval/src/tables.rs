@@ -4,6 +4,7 @@ mod reliability;
 mod summary;
 
 use evfocus_core::Method;
+use serde::Serialize;
 
 use crate::dataset::{Condition, Dataset};
 use crate::result::{Score, SequenceResult};
@@ -42,6 +43,35 @@ pub fn markdown(dataset: &Dataset, results: &[SequenceResult]) -> String {
     stress_table(&mut text, results);
     reliability::table(&mut text, results);
     text
+}
+
+/// A cell of the tables: the errors of a method in one condition.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedScore {
+    /// The candidate's name.
+    pub method: String,
+    /// The condition; `None` for all together.
+    pub condition: Option<Condition>,
+    /// Its errors.
+    #[serde(flatten)]
+    pub score: Score,
+}
+
+/// The tables of the sequences without stress, cell by cell.
+pub fn scores(results: &[SequenceResult]) -> Vec<NamedScore> {
+    let plain: Vec<SequenceResult> =
+        results.iter().filter(|result| result.label.stress.is_none()).cloned().collect();
+    let conditions: Vec<Option<Condition>> = Condition::ALL.into_iter().map(Some).chain([None]).collect();
+    let mut scores = Vec::new();
+    for candidate in Candidate::all() {
+        for &condition in &conditions {
+            let score = Score::in_condition(&plain, candidate, condition);
+            if score.answers + score.none > 0 {
+                scores.push(NamedScore { method: candidate.to_string(), condition, score });
+            }
+        }
+    }
+    scores
 }
 
 fn put(text: &mut String, line: &str) {

@@ -29,7 +29,7 @@ pub struct FocusRequest {
     pub speed_counts_per_s: Option<f64>,
     /// The accumulation interval of the fixed-interval measures, in microseconds.
     pub interval_us: Option<u64>,
-    /// Which ways to sweep, whatever the speed: `forward`, or `both` for there and back, which cancels lag and backlash.
+    /// Which ways to sweep, whatever the speed: `forward`, or `both` for there and back, which cancels the lag.
     pub directions: Option<String>,
     /// The windows of the picture to focus on, at most 8; the whole picture if there are none.
     #[serde(default)]

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
+use evfocus_core::controller::check_windows;
 use evfocus_core::{
     CameraMicros, Failure, Flags, Geometry, LegReport, LensPosition, LensSpeed, LensTrace, Method, Prefer,
     Windows,
@@ -104,7 +105,11 @@ pub(crate) fn analyze(request: &Request) -> anyhow::Result<RecordingAnalysis> {
 
 /// The windows asked for, in pixels of the recording's sensor.
 fn windows_on(geometry: Geometry, request: &Request) -> Result<Windows, UsageError> {
-    windows::in_pixels(&request.windows, geometry).map_err(|error| UsageError(in_options(&error)))
+    let windows =
+        windows::in_pixels(&request.windows, geometry).map_err(|error| UsageError(in_options(&error)))?;
+    check_windows(&windows, request.prefer, request.method, geometry)
+        .map_err(|refusal| UsageError(format!("--window, --prefer: {refusal}")))?;
+    Ok(windows)
 }
 
 /// The daemon's words for what is wrong, with the name of the option.

@@ -14,6 +14,9 @@ use evfocus_tests::random_runs::{Ended, Trial, Verdict, run_all};
 
 type Run = (u64, Trial, Ended);
 
+/// Exit status if a run was wrong or misled; 1 is an error.
+const UNSOUND: u8 = 3;
+
 fn main() -> Result<ExitCode> {
     let mut words = std::env::args().skip(1);
     let number = |word: Option<String>, otherwise: u64| {
@@ -47,7 +50,7 @@ fn main() -> Result<ExitCode> {
             );
         }
     }
-    Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if sound { ExitCode::SUCCESS } else { ExitCode::from(UNSOUND) })
 }
 
 fn dump(path: &str, runs: &[Run]) -> Result<()> {

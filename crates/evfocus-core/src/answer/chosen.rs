@@ -78,7 +78,12 @@ fn is_nearer(one: LensPosition, other: LensPosition, rules: &Rules) -> bool {
     (one > other) == rules.nearest_is_high
 }
 
-/// The answer of the whole picture, or that of the preferred window if there are windows.
+fn is_sound(said: &StructureAnswer, rules: &Rules) -> bool {
+    !said.is_unsure && said.significant().is_ok() && !is_at_edge(said.position, rules.range, rules.edge_share)
+}
+
+/// The answer of the whole picture, or that of the preferred window if there are windows. One that may be believed alone comes before any
+/// that may not: the nearest chance peak is no subject.
 fn choose(leg: &LegReport, rules: &Rules) -> Result<(StructureAnswer, Option<u8>), Failure> {
     let not_asked = Failure::NoAnswer(SearchError::NoLength { at_us: leg.start.0 });
     if leg.windows.first().is_none_or(Option::is_none) {
@@ -92,6 +97,7 @@ fn choose(leg: &LegReport, rules: &Rules) -> Result<(StructureAnswer, Option<u8>
             (Err(error), _) => first_error = Failure::of_search(*error),
             (Ok(said), prefer) => {
                 let wins = best.is_none_or(|(best, _)| match prefer {
+                    _ if is_sound(said, rules) != is_sound(&best, rules) => is_sound(said, rules),
                     Prefer::Nearest => is_nearer(said.position, best.position, rules),
                     Prefer::Strongest | Prefer::Window(_) => said.significance > best.significance,
                 });

@@ -201,7 +201,7 @@ impl FocusRequest {
             windows: self.windows,
             prefer,
         };
-        check_windows(&plan, geometry)?;
+        check_windows(&plan.windows, plan.prefer, plan.method, geometry)?;
         for (what, end) in [("range start", plan.range.min()), ("range end", plan.range.max())] {
             if !config.limits.contains(end) {
                 return Err(Refusal::OutOfRange { what, value: end.0, limits: config.limits });
@@ -223,20 +223,29 @@ impl FocusRequest {
     }
 }
 
-fn check_windows(plan: &FocusPlan, geometry: Geometry) -> Result<(), Refusal> {
-    let windows = plan.windows.iter().flatten();
+/// Whether a request for `windows` of a sensor of `geometry` makes sense with this preference and method.
+///
+/// # Errors
+/// [`Refusal::Window`], [`Refusal::NoSuchWindow`] or [`Refusal::NoWindows`].
+pub fn check_windows(
+    windows: &Windows,
+    prefer: Prefer,
+    method: Method,
+    geometry: Geometry,
+) -> Result<(), Refusal> {
+    let windows = windows.iter().flatten();
     if let Some((index, &window)) = windows.clone().enumerate().find(|(_, window)| !window.fits(geometry)) {
         return Err(Refusal::Window { index, window, geometry });
     }
     let number = windows.count();
-    match plan.prefer {
+    match prefer {
         Prefer::Window(index) if usize::from(index) >= number => {
             Err(Refusal::NoSuchWindow { index, windows: number })
         }
         Prefer::Window(_) | Prefer::Strongest | Prefer::Nearest
-            if number > 0 && !matches!(plan.method, Method::Structure | Method::Auto) =>
+            if number > 0 && !matches!(method, Method::Structure | Method::Auto) =>
         {
-            Err(Refusal::NoWindows { method: plan.method })
+            Err(Refusal::NoWindows { method })
         }
         Prefer::Window(_) | Prefer::Strongest | Prefer::Nearest => Ok(()),
     }

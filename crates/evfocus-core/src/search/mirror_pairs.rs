@@ -30,8 +30,8 @@ const NARROW: f64 = 3.0;
 const WIDE: f64 = 40.0;
 /// Votes this near to the mode, bins, belong to it.
 const NEAR: f64 = 8.0;
-/// Fewer votes in the mode than this prove nothing.
-const FEWEST_VOTES: f64 = 50.0;
+/// Fewer votes in the mode, in a bin times its width, than this prove nothing.
+const FEWEST_VOTES: f64 = 5.0;
 
 /// Where a pixel's levels were last reached.
 #[derive(Debug, Clone, Copy)]
@@ -145,7 +145,7 @@ impl MirrorPairs {
         let highest =
             (0..Bookings::BINS).map(|bin| (bin, excess(bin))).max_by(|(_, a), (_, b)| a.total_cmp(b));
         let (bin, height) = highest?;
-        (height * NARROW > FEWEST_VOTES / 10.0).then_some(bin as f64 + 0.5)
+        (height * NARROW > FEWEST_VOTES).then_some(bin as f64 + 0.5)
     }
 
     /// The mode among the pairs of each distance, drawn on to distance 0 by a straight line.
@@ -183,14 +183,13 @@ fn weighted(votes: &[f64], middle: usize, sigma: f64) -> f64 {
     sum / total
 }
 
-/// The median of the votes near `mode` in excess of their level farther out, and how many these are.
+/// The mean of the votes near `mode` in excess of their level farther out, and how many these are.
 fn middle_near(votes: &[f64], mode: f64) -> Option<(f64, f64)> {
     let near = |bin: usize| libm::fabs(bin as f64 + 0.5 - mode) <= NEAR;
     let around = |bin: usize| !near(bin) && libm::fabs(bin as f64 + 0.5 - mode) <= 2.0 * NEAR;
     let mean = |wanted: &dyn Fn(usize) -> bool| {
         let (mut sum, mut number) = (0.0, 0.0);
-        for (bin, votes) in votes.iter().enumerate().filter(|(bin, _)| wanted(*bin)) {
-            let _ = bin;
+        for (_, votes) in votes.iter().enumerate().filter(|(bin, _)| wanted(*bin)) {
             sum += votes;
             number += 1.0;
         }

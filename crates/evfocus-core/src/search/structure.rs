@@ -42,7 +42,7 @@ pub const MOST_WINDOWS: usize = 8;
 /// What one tile of the picture says.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TileAnswer {
-    /// Where it was sharpest, the delay of the pixels taken off as from the whole.
+    /// Where it was sharpest, the delay of the pixels still in it.
     pub position: LensPosition,
     /// How high its peak is in units of what chance makes.
     pub significance: f64,
@@ -172,7 +172,12 @@ impl StructureSearch {
         &mut self,
         sweep: &Sweep<'_>,
     ) -> impl Iterator<Item = (Window, Result<StructureAnswer, SearchError>)> {
-        self.windows.iter_mut().map(move |measure| (measure.window(), answer(measure, sweep)))
+        // Noise is metered on the whole picture: a window may hold nothing quiet, or no whole tile.
+        let noise_hz = self.whole.noise_hz();
+        self.windows.iter_mut().map(move |measure| {
+            let said = answer(measure, sweep).map(|said| StructureAnswer { noise_hz, ..said });
+            (measure.window(), said)
+        })
     }
 }
 

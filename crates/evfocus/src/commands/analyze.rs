@@ -35,7 +35,7 @@ The positions file says where the lens was, one sample a line, oldest first:
   1000,221.8
 t_us is in microseconds of the camera's clock, position in the lens's own counts. It must cover the recording (10 ms at either \
 end may be missing). Where the lens turns round, a new sweep begins; with sweeps in both directions the answer is the mean of \
-both, which cancels lag and backlash. Half their difference (delay_us in JSON, as a time) is lag plus backlash, and with methods \
+both, each weighted by how sure it is, which cancels the lag. Half their difference (delay_us in JSON, as a time) is lag plus backlash, and with methods \
 that answer with the first of two humps of events mostly how far those are apart.
 
 The answer comes with one standard deviation (±) and the probability that it is right to within 1 % of the range.

@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use evfocus_eval::dataset::{Dataset, ead, elp, simulated, stress_suite, sweep_files};
 use evfocus_eval::result::SequenceResult;
+use evfocus_eval::tables::NamedScore;
 use evfocus_eval::{Cache, cache, evaluate, figures, tables};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -43,7 +44,7 @@ pub struct Arguments {
     /// Print tables as Markdown; the default
     #[arg(long)]
     markdown: bool,
-    /// Print every answer and curve as JSON instead
+    /// Print the tables, every answer and every curve as JSON instead
     #[arg(long, conflicts_with = "markdown")]
     json: bool,
     /// Draw the errors, focus curves and the golden search's steps into this folder, as SVG
@@ -75,6 +76,7 @@ enum Suite {
 struct Judged<'a> {
     dataset: &'a str,
     about: &'a str,
+    scores: Vec<NamedScore>,
     results: &'a [SequenceResult],
 }
 
@@ -122,7 +124,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     if arguments.json {
         let judged: Vec<Judged> = judged
             .iter()
-            .map(|(Dataset { name, about, .. }, results)| Judged { dataset: name, about, results })
+            .map(|(Dataset { name, about, .. }, results)| Judged {
+                dataset: name,
+                about,
+                scores: tables::scores(results),
+                results,
+            })
             .collect();
         out.json(&judged)?;
     } else {

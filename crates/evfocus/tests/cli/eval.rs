@@ -131,4 +131,9 @@ fn windows_and_the_map_are_of_the_recording() {
     assert_eq!(right["sweeps"][0]["windows"].as_array().unwrap().len(), 2);
     let off = [two.analyze().as_slice(), &["--window", "300,0,100,100"]].concat();
     refuses(&off, 2, &["--window", "346 x 260"]);
+    let refused =
+        |more: &[&str], words: &[&str]| refuses(&[two.analyze().as_slice(), more].concat(), 2, words);
+    refused(&["--window", "0,0,0.5,1.0", "--method", "egs"], &["egs", "whole picture"]);
+    refused(&["--prefer", "3"], &["--prefer"]);
+    refused(&["--window", "0,0,0.5,1.0", "--prefer", "1"], &["--prefer"]);
 }

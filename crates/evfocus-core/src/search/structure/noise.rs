@@ -89,7 +89,8 @@ impl NoiseMeter {
         }
         let silent_spans = (now - end) / SPAN_US;
         if let Some(number) = self.seen.first_mut() {
-            *number += (silent_spans * self.counts.len() as i64) as u32;
+            let silent = u32::try_from(silent_spans * self.counts.len() as i64).unwrap_or(u32::MAX);
+            *number = number.saturating_add(silent);
         }
         self.span_end = Some(end + (silent_spans + 1) * SPAN_US);
     }
@@ -97,8 +98,8 @@ impl NoiseMeter {
     /// Noise events per second and pixel, ON and OFF together: twice the mean OFF rate of the quietest tenth of the tiles and spans. 0
     /// for a window that holds no whole tile.
     pub fn noise_hz(&self) -> f64 {
-        let all: u32 = self.seen.iter().sum();
-        let quietest = QUIETEST * f64::from(all);
+        let all: u64 = self.seen.iter().copied().map(u64::from).sum();
+        let quietest = QUIETEST * all as f64;
         let (mut left, mut events) = (quietest, 0.0);
         for (count, &number) in self.seen.iter().enumerate() {
             let taken = f64::from(number).min(left);
