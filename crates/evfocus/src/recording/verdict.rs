@@ -8,6 +8,8 @@ use super::SweepAnalysis;
 #[derive(Debug)]
 pub(crate) struct Verdict {
     pub(crate) outcome: Result<Answer, Failure>,
+    /// What each window says of all sweeps together, as if it had been the one preferred.
+    pub(crate) windows: Vec<Result<Answer, Failure>>,
     /// Half the difference of the two directions' answers as a time: lag plus backlash.
     pub(crate) delay_us: Option<f64>,
     /// Camera time at which the first sweep passed the answer.
@@ -19,11 +21,14 @@ impl Verdict {
     pub(super) fn of(sweeps: &[SweepAnalysis], method: Method, prefer: Prefer) -> Self {
         let outcome = answer_of_all(sweeps, method, prefer);
         let (found, first) = (outcome.as_ref().ok(), sweeps.first());
+        let number = first.map_or(0, |sweep| sweep.report.windows.iter().flatten().count());
+        let of_window = |index: usize| answer_of_all(sweeps, method, Prefer::Window(index as u8));
         Self {
             delay_us: found.zip(first).and_then(|(found, first)| {
                 Some(found.half_difference? / first.speed.counts_per_second() * 1e6)
             }),
             t_us: found.zip(first).map(|(found, first)| first.passed(found.position, method)),
+            windows: (0..number).map(of_window).collect(),
             outcome,
         }
     }

@@ -29,6 +29,8 @@ pub(super) struct Analysis {
     second_depth: Option<f64>,
     /// The number of the window that decided, from 0.
     window: Option<u8>,
+    /// What each window says, in their order.
+    windows: Vec<InWindow>,
     /// When the first sweep passed the position.
     t_us: Option<f64>,
     /// Half the difference of the two directions as a time: lag plus backlash.
@@ -41,6 +43,31 @@ pub(super) struct Analysis {
     curve: Curve,
     sweeps: Vec<Sweep>,
     warnings: Vec<String>,
+}
+
+/// The answer of one window, from all sweeps together.
+#[derive(Debug, Serialize)]
+struct InWindow {
+    state: State,
+    reason: Option<&'static str>,
+    position: Option<f64>,
+    error_bar: Option<f64>,
+    confidence: Option<f64>,
+    flags: Vec<&'static str>,
+}
+
+impl InWindow {
+    fn of(outcome: &Result<Answer, Failure>) -> Self {
+        let found = outcome.as_ref().ok();
+        Self {
+            state: state(outcome.is_ok()),
+            reason: outcome.as_ref().err().map(Failure::name),
+            position: found.map(|answer| answer.position.0),
+            error_bar: found.and_then(|answer| answer.error_bar),
+            confidence: found.and_then(|answer| answer.confidence),
+            flags: names(found.map(|answer| answer.flags).unwrap_or_default()),
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -123,6 +150,7 @@ impl Analysis {
             decided_by: found.map(|answer| answer.decided_by.name()),
             second_depth: found.and_then(|answer| Some(answer.second_depth?.0)),
             window: found.and_then(|answer| answer.window),
+            windows: analysis.verdict.windows.iter().map(InWindow::of).collect(),
             t_us: analysis.verdict.t_us,
             delay_us: analysis.verdict.delay_us,
             events: sweeps.iter().map(|sweep| sweep.events).sum(),
