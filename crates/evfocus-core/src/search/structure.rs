@@ -109,7 +109,7 @@ impl StructureAnswer {
 
 /// A peak wider than this part of the sweep is no peak.
 const WIDEST: f64 = 0.4;
-/// An apex nearer to the end of the sweep than this part of its width may be no peak.
+/// An apex nearer to the start than this part of its width is the start itself.
 const END: f64 = 0.05;
 /// An apex nearer to an end than this part of its width is cut off.
 const EDGE: f64 = 0.5;
@@ -190,15 +190,17 @@ fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<Structure
     let first = measure.read(Reading::FIRST).ok_or(nothing)?;
     // Near the start the picture at the start is the wrong one to compare with. And where not much texture is blurred away by far,
     // what is most unlike the start is the other end.
-    let is_at_end = measure.bins_covered() as f64 - first.at < END * first.width;
+    let is_at_end = measure.bins_covered() as f64 - first.at < EDGE * first.width;
     let (mut reference, passes) = if first.at < first.width || is_at_end { (1.0, 2) } else { (0.0, 1) };
     if passes == 2 {
         measure.take_again(sweep.store, sweep.trace);
     }
     if is_at_end && first.at >= first.width {
         let other = measure.read(Reading { reference: 1.0, ..Reading::FIRST }).ok_or(nothing)?;
-        // Compared with the end, what is truly sharp at the end is most unlike the start.
-        if other.at < EDGE * other.width {
+        // Compared with the end, what is truly sharp near the end is most unlike the start, or anything blurred alike.
+        let is_no_peak =
+            other.width > WIDEST * Bookings::BINS as f64 || other.significance < LEAST_SIGNIFICANCE;
+        if other.at < END * other.width || is_no_peak {
             reference = 0.0;
         }
     }
