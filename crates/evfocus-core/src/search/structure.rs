@@ -191,11 +191,14 @@ fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<Structure
     // Near the start the picture at the start is the wrong one to compare with. And where not much texture is blurred away by far,
     // what is most unlike the start is the other end.
     let is_at_end = measure.bins_covered() as f64 - first.at < EDGE * first.width;
-    let (mut reference, passes) = if first.at < first.width || is_at_end { (1.0, 2) } else { (0.0, 1) };
+    // What chance makes is not worth going over the events again.
+    let is_cut_off = first.at < first.width || is_at_end;
+    let (mut reference, passes) =
+        if is_cut_off && first.significance >= FAINTEST { (1.0, 2) } else { (0.0, 1) };
     if passes == 2 {
         measure.take_again(sweep.store, sweep.trace);
     }
-    if is_at_end && first.at >= first.width {
+    if passes == 2 && first.at >= first.width {
         let other = measure.read(Reading { reference: 1.0, ..Reading::FIRST }).ok_or(nothing)?;
         // Compared with the end, what is truly sharp near the end is most unlike the start, or anything blurred alike.
         let is_no_peak =
