@@ -110,7 +110,7 @@ impl StructureAnswer {
 /// A peak wider than this part of the sweep is no peak.
 const WIDEST: f64 = 0.4;
 /// An apex nearer to the start than this part of its width is the start itself.
-const END: f64 = 0.05;
+const START: f64 = 0.05;
 /// An apex nearer to an end than this part of its width is cut off.
 const EDGE: f64 = 0.5;
 
@@ -118,12 +118,15 @@ const EDGE: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub(crate) struct StructureSearch {
     whole: StructureMeasure,
+    /// Of the whole picture: a window may hold nothing quiet, or no whole tile.
+    noise: NoiseMeter,
     windows: Vec<StructureMeasure>,
 }
 
 impl StructureSearch {
     pub(crate) fn new(geometry: Geometry) -> Self {
-        Self { whole: StructureMeasure::new(Window::whole(geometry)), windows: Vec::new() }
+        let whole = Window::whole(geometry);
+        Self { whole: StructureMeasure::new(whole), noise: NoiseMeter::new(whole), windows: Vec::new() }
     }
 
     /// Looks at these windows too, at most [`MOST_WINDOWS`]. Allocates their memory if they are not those of before.
@@ -134,27 +137,33 @@ impl StructureSearch {
     }
 
     pub(crate) fn begin_rest(&mut self) {
-        self.measures().for_each(StructureMeasure::begin_rest);
+        self.noise.forget();
     }
 
     pub(crate) fn observe_rest(&mut self, events: &[Event]) {
-        self.measures().for_each(|measure| measure.observe_rest(events));
+        for event in events {
+            self.noise.take(event);
+        }
     }
 
     pub(crate) fn end_rest(&mut self) {
-        self.measures().for_each(StructureMeasure::end_rest);
+        self.noise.end_rest();
     }
 
     pub(crate) fn begin(&mut self, travel: Travel) {
-        self.measures().for_each(|measure| measure.begin(travel));
+        self.noise.begin();
+        self.whole.begin(travel);
+        for window in &mut self.windows {
+            window.begin(travel);
+        }
     }
 
     pub(crate) fn take(&mut self, store: &EventStore, trace: &LensTrace<CameraMicros>, until: CameraMicros) {
-        self.measures().for_each(|measure| measure.take(store, trace, until));
-    }
-
-    fn measures(&mut self) -> impl Iterator<Item = &mut StructureMeasure> {
-        core::iter::once(&mut self.whole).chain(&mut self.windows)
+        let Self { whole, noise, windows } = self;
+        whole.take(store, trace, until, |event| noise.take(event));
+        for window in windows {
+            window.take(store, trace, until, |_| {});
+        }
     }
 
     /// The peak so far, of the whole picture or of the windows together.
@@ -162,29 +171,31 @@ impl StructureSearch {
         self.whole.has_passed_peak() && self.windows.iter_mut().all(StructureMeasure::has_passed_peak)
     }
 
-    /// The answer of the whole picture, which may be too weak to be believed alone.
+    /// Takes what is left of `sweep`. The answer of the whole picture, which may be too weak to be believed alone.
     pub(crate) fn answer(&mut self, sweep: &Sweep<'_>) -> Result<StructureAnswer, SearchError> {
-        answer(&mut self.whole, sweep)
+        all_events_kept(sweep)?;
+        self.take(sweep.store, sweep.trace, sweep.end);
+        answer(&mut self.whole, self.noise.noise_hz(), sweep)
     }
 
-    /// The answers of the windows.
+    /// The answers of the windows, after that of the whole picture.
     pub(crate) fn window_answers(
         &mut self,
         sweep: &Sweep<'_>,
     ) -> impl Iterator<Item = (Window, Result<StructureAnswer, SearchError>)> {
-        // Noise is metered on the whole picture: a window may hold nothing quiet, or no whole tile.
-        let noise_hz = self.whole.noise_hz();
+        let noise_hz = self.noise.noise_hz();
         self.windows.iter_mut().map(move |measure| {
-            let said = answer(measure, sweep).map(|said| StructureAnswer { noise_hz, ..said });
-            (measure.window(), said)
+            (measure.window(), all_events_kept(sweep).and_then(|()| answer(measure, noise_hz, sweep)))
         })
     }
 }
 
-/// Reads the answer off `measure`, which has begun its sweep.
-fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<StructureAnswer, SearchError> {
-    all_events_kept(sweep)?;
-    measure.take(sweep.store, sweep.trace, sweep.end);
+/// Reads the answer off `measure`, which has taken its sweep.
+fn answer(
+    measure: &mut StructureMeasure,
+    noise_hz: f64,
+    sweep: &Sweep<'_>,
+) -> Result<StructureAnswer, SearchError> {
     let nothing = SearchError::Weak { significance: 0.0 };
     let travel = measure.travel().ok_or(nothing)?;
     let first = measure.read(Reading::FIRST).ok_or(nothing)?;
@@ -203,7 +214,7 @@ fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<Structure
         // Compared with the end, what is truly sharp near the end is most unlike the start, or anything blurred alike.
         let is_no_peak =
             other.width > WIDEST * Bookings::BINS as f64 || other.significance < LEAST_SIGNIFICANCE;
-        if other.at < END * other.width || is_no_peak {
+        if other.at < START * other.width || is_no_peak {
             reference = 0.0;
         }
     }
@@ -217,13 +228,13 @@ fn answer(measure: &mut StructureMeasure, sweep: &Sweep<'_>) -> Result<Structure
     if found.apex.significance < FAINTEST {
         return Err(SearchError::Weak { significance: found.apex.significance });
     }
-    Ok(in_counts(measure, &found, passes, travel, sweep))
+    Ok(in_counts(measure, &found, (noise_hz, passes), travel, sweep))
 }
 
 fn in_counts(
     measure: &StructureMeasure,
     found: &Found,
-    passes: u32,
+    (noise_hz, passes): (f64, u32),
     travel: Travel,
     sweep: &Sweep<'_>,
 ) -> StructureAnswer {
@@ -236,7 +247,7 @@ fn in_counts(
         width: apex.width * counts,
         significance: apex.significance,
         scatter: scatter * counts,
-        noise_hz: measure.noise_hz(),
+        noise_hz,
         velocity: travel.velocity(sweep, apex.at, apex.width / 2.0),
         rival: rival.map(|rival| travel.position_of(rival.at)),
         is_coarse: filter == Filter::Coarse,

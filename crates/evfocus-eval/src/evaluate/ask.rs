@@ -250,7 +250,7 @@ fn structure_curve(geometry: Geometry, sweep: &Sweep<'_>) -> Option<Curve> {
     let travel = Travel::of(sweep).ok()?;
     let mut measure = StructureMeasure::new(Window::whole(geometry));
     measure.begin(travel);
-    measure.take(sweep.store, sweep.trace, sweep.end);
+    measure.take(sweep.store, sweep.trace, sweep.end, |_| {});
     measure.read(Reading::FIRST)?;
     let points = measure.curve().iter().enumerate();
     // Each point holds what happened up to the end of its bin.

@@ -5,7 +5,6 @@ use alloc::vec::Vec;
 use super::apex::{Apex, ApexFinder, TOP};
 use super::bookings::{Bookings, Filter, TileSet};
 use super::kernel::{StructureKernel, TravelStep};
-use super::noise::NoiseMeter;
 use super::reading::LEAST_SIGNIFICANCE;
 use super::travel::{LensCursor, Travel};
 use crate::event::{Event, Window};
@@ -60,7 +59,6 @@ impl Reading {
 #[derive(Debug, Clone)]
 pub struct StructureMeasure {
     kernel: StructureKernel,
-    noise: NoiseMeter,
     finder: ApexFinder,
     curve: Vec<f64>,
     progress: Option<Progress>,
@@ -71,34 +69,15 @@ impl StructureMeasure {
     pub fn new(window: Window) -> Self {
         Self {
             kernel: StructureKernel::new(window),
-            noise: NoiseMeter::new(window),
             finder: ApexFinder::new(),
             curve: Vec::with_capacity(Bookings::BINS),
             progress: None,
         }
     }
 
-    /// Forgets the runs before: what comes next comes at rest.
-    pub fn begin_rest(&mut self) {
-        self.noise.forget();
-    }
-
-    /// Takes events made while the lens stands still before its sweep.
-    pub fn observe_rest(&mut self, events: &[Event]) {
-        for event in events {
-            self.noise.take(event);
-        }
-    }
-
-    /// The lens is about to begin its sweep.
-    pub fn end_rest(&mut self) {
-        self.noise.end_rest();
-    }
-
     /// Begins a sweep over the way of `travel`, whose events an emptied store will hold.
     pub fn begin(&mut self, travel: Travel) {
         self.kernel.begin();
-        self.noise.begin();
         self.progress = Some(Progress {
             cursor: LensCursor::new(travel),
             travel,
@@ -108,15 +87,22 @@ impl StructureMeasure {
         });
     }
 
-    /// Takes the events of `store` that it has not taken yet, up to the time `until`, for which `trace` tells the lens positions.
-    pub fn take(&mut self, store: &EventStore, trace: &LensTrace<CameraMicros>, until: CameraMicros) {
+    /// Takes the events of `store` that it has not taken yet, up to the time `until`, for which `trace` tells the lens positions. Each is
+    /// shown to `also`, as are those made before the lens moved.
+    pub fn take(
+        &mut self,
+        store: &EventStore,
+        trace: &LensTrace<CameraMicros>,
+        until: CameraMicros,
+        mut also: impl FnMut(&Event),
+    ) {
         let Some(progress) = &mut self.progress else { return };
         for event in store.iter().skip(progress.taken.1) {
             if event.t > until || progress.phase == Phase::Arrived {
                 return;
             }
             let step = progress.cursor.at(event.t, trace);
-            self.noise.take(&event);
+            also(&event);
             if progress.phase == Phase::AtStart {
                 if step.0 < REST {
                     progress.taken.1 += 1;
@@ -171,11 +157,6 @@ impl StructureMeasure {
     /// The energy by bin of the lens's way, as last read; its unit is arbitrary.
     pub fn curve(&self) -> &[f64] {
         &self.curve
-    }
-
-    /// The noise of the pixels, Hz.
-    pub fn noise_hz(&self) -> f64 {
-        self.noise.noise_hz()
     }
 
     /// The pixels it looks at.
