@@ -24,9 +24,9 @@ pub struct NoiseMeter {
     counts: Vec<u16>,
     span_end: Option<i64>,
     /// How many tiles and spans had each count.
-    seen: Vec<u32>,
+    seen: Vec<u64>,
     /// The same while the lens stood still before the sweeps.
-    at_rest: Vec<u32>,
+    at_rest: Vec<u64>,
 }
 
 impl NoiseMeter {
@@ -89,8 +89,8 @@ impl NoiseMeter {
         }
         let silent_spans = (now - end) / SPAN_US;
         if let Some(number) = self.seen.first_mut() {
-            let silent = u32::try_from(silent_spans * self.counts.len() as i64).unwrap_or(u32::MAX);
-            *number = number.saturating_add(silent);
+            // A leap of the camera's clock makes many; 64 bits hold every one that there is time for.
+            *number += silent_spans as u64 * self.counts.len() as u64;
         }
         self.span_end = Some(end + (silent_spans + 1) * SPAN_US);
     }
@@ -98,11 +98,11 @@ impl NoiseMeter {
     /// Noise events per second and pixel, ON and OFF together: twice the mean OFF rate of the quietest tenth of the tiles and spans. 0
     /// for a window that holds no whole tile.
     pub fn noise_hz(&self) -> f64 {
-        let all: u64 = self.seen.iter().copied().map(u64::from).sum();
+        let all: u64 = self.seen.iter().sum();
         let quietest = QUIETEST * all as f64;
         let (mut left, mut events) = (quietest, 0.0);
         for (count, &number) in self.seen.iter().enumerate() {
-            let taken = f64::from(number).min(left);
+            let taken = (number as f64).min(left);
             events += taken * count as f64;
             left -= taken;
         }
