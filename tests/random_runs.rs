@@ -7,7 +7,7 @@ use evfocus_tests::random_runs::{Trial, Verdict, run_all};
 #[test]
 fn random_runs_end_in_focus_or_with_the_right_reason() -> Result<()> {
     let seeds: Vec<u64> = (2000..2016).collect();
-    let runs = run_all(&seeds, 2, &|_| {})?;
+    let runs = run_all(&seeds, 2)?;
     for (seed, trial, ended) in &runs {
         let verdict = ended.verdict(trial);
         println!("seed {seed}: {}, {}, error {:?}", verdict.title(), ended.reason(), ended.error);

@@ -363,15 +363,11 @@ impl Ended {
     }
 }
 
-/// Makes the runs of `seeds` on `threads` threads; `finished` is told of each as it ends.
+/// Makes the runs of `seeds` on `threads` threads.
 ///
 /// # Errors
 /// The first run that could not be made or did not end, with its seed.
-pub fn run_all(
-    seeds: &[u64],
-    threads: usize,
-    finished: &(dyn Fn(u64) + Sync),
-) -> Result<Vec<(u64, Trial, Ended)>> {
+pub fn run_all(seeds: &[u64], threads: usize) -> Result<Vec<(u64, Trial, Ended)>> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::with_capacity(seeds.len()));
     std::thread::scope(|scope| {
@@ -379,7 +375,6 @@ pub fn run_all(
             scope.spawn(|| {
                 while let Some(&seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let run = one(seed).with_context(|| format!("the run of seed {seed}"));
-                    finished(seed);
                     if let Ok(mut done) = done.lock() {
                         done.push((seed, run));
                     }

@@ -267,6 +267,11 @@ impl Failure {
         }
     }
 
+    /// Whether it is the last word on `sweeps` sweeps: what one way does not say, the other may.
+    pub fn is_final(&self, sweeps: usize) -> bool {
+        sweeps < 2 || self.doubt().is_none()
+    }
+
     /// Whether the lens itself is at fault, so that it must not be told to move again.
     pub fn is_of_lens(&self) -> bool {
         matches!(

@@ -25,7 +25,7 @@ fn main() -> Result<ExitCode> {
     let (runs, first) = (number(words.next(), 1000)?, number(words.next(), 1)?);
     let seeds: Vec<u64> = (first..first + runs).collect();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let runs = run_all(&seeds, threads, &|_| {})?;
+    let runs = run_all(&seeds, threads)?;
     if let Some(path) = words.next() {
         dump(&path, &runs)?;
     }

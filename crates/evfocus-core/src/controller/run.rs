@@ -167,17 +167,14 @@ impl Controller {
         if let Some(place) = run.legs.get_mut(leg) {
             *place = Some(report);
         }
-        // What one way does not say, the other may.
-        let knows_its_error = matches!(run.plan.method, Method::Structure | Method::Auto);
+        let sweeps = match (run.plan.method, run.plan.directions) {
+            // The others do not know what they do not know.
+            (Method::Structure | Method::Auto, Directions::Both) => 2,
+            _ => 1,
+        };
         let verdict = match verdict {
-            Err(failure)
-                if knows_its_error
-                    && run.plan.directions == Directions::Both
-                    && failure.doubt().is_some() =>
-            {
-                Ok(())
-            }
-            other => other,
+            Err(failure) if !failure.is_final(sweeps) => Ok(()),
+            verdict => verdict,
         };
         match (verdict, leg, run.plan.directions) {
             (Err(failure), _, _) => self.fail(failure, now, actions),

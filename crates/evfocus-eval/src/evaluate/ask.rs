@@ -103,10 +103,10 @@ fn by_core(
     let rules = Rules { delays, ..Rules::for_range(range) };
     if method == Method::Auto {
         for way in ways {
-            match way.verdict {
-                // What one way does not say, the other may.
-                Err(failure) if ways.len() > 1 && failure.doubt().is_some() => {}
-                verdict => verdict.map_err(|failure| failure.to_string())?,
+            if let Err(failure) = way.verdict
+                && failure.is_final(ways.len())
+            {
+                return Err(failure.to_string());
             }
         }
     }

@@ -37,10 +37,10 @@ impl Verdict {
 fn answer_of_all(sweeps: &[SweepAnalysis], method: Method, prefer: Prefer) -> Result<Answer, Failure> {
     let nothing = Failure::TooFewEvents { events: 0, needed: SweepLimits::default().fewest_events };
     for sweep in sweeps {
-        match sweep.verdict {
-            // What one way does not say, the other may.
-            Err(failure) if sweeps.len() > 1 && failure.doubt().is_some() => {}
-            verdict => verdict?,
+        if let Err(failure) = sweep.verdict
+            && failure.is_final(sweeps.len())
+        {
+            return Err(failure);
         }
     }
     let rules = Rules { prefer, ..Rules::for_range(extent(sweeps).ok_or(nothing)?) };
