@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use evfocus_core::{CameraMicros, LensTrace};
-use hil_sim::Rig;
+use evfocus_core::CameraMicros;
+use evfocus_eval::simulated_sweep::SimulatedSweep;
 use serde::Serialize;
 
 use super::Plan;
@@ -49,21 +49,16 @@ struct Frames {
 }
 
 impl Truth {
-    pub(super) fn new(
-        plan: &Plan,
-        rig: &Rig,
-        glass: &LensTrace<CameraMicros>,
-        (events, lost): (u64, u64),
-        frames: Option<(u64, f64)>,
-    ) -> Self {
+    pub(super) fn new(plan: &Plan, made: &SimulatedSweep, frames: Option<(u64, f64)>) -> Self {
+        let SimulatedSweep { rig, glass, events, lost, .. } = made;
         let (config, truth) = (rig.config(), rig.truth());
         let first = truth.first().copied().unwrap_or(config.focus);
         Self {
             position: first.0,
             positions: truth.iter().map(|position| position.0).collect(),
             times_us: glass.crossings(first).collect(),
-            events,
-            lost,
+            events: *events,
+            lost: *lost,
             seed: config.seed,
             scene: config.scene.name(),
             camera: config.sensor.model.clone(),
