@@ -15,9 +15,8 @@ use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
 use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 use crate::Port;
-use crate::continuity::Continuity;
-use crate::drive::{Drive, DriveConfig};
-use crate::line::Line;
+use crate::drive::DriveConfig;
+use crate::rate_drive::RateDrive;
 use protocol::{Command, Decoder, Message, PinMode};
 
 /// Baud rate of StandardFirmata.
@@ -56,14 +55,12 @@ struct Board {
 /// A lens behind an Arduino with StandardFirmata.
 #[derive(Debug)]
 pub struct Firmata {
-    line: Line,
+    rate: RateDrive,
     decoder: Decoder,
     config: FirmataConfig,
     board: Board,
-    drive: Drive,
     /// What the pins were told last: duty and direction.
     output: (u16, bool),
-    continuity: Continuity,
 }
 
 impl Firmata {
@@ -73,29 +70,24 @@ impl Firmata {
     /// What keeps the port from being opened; that nothing, or something else, answers; that a pin cannot do its work.
     pub fn open(port: Port, config: FirmataConfig, clock: Arc<dyn Clock>) -> Result<Self, DeviceError> {
         let mut lens = Self {
-            line: Line::new("Firmata board", port, clock),
+            rate: RateDrive::new("Firmata board", port, config.drive, clock),
             decoder: Decoder::default(),
             config,
             board: Board { full_reading: 1023.0, full_duty: 255.0 },
-            drive: Drive::new(config.drive),
             output: (0, false),
-            continuity: Continuity::new(config.drive.range, config.drive.max_speed),
         };
         lens.ready()?;
         Ok(lens)
     }
 
     fn ready(&mut self) -> Result<(), DeviceError> {
-        if self.line.is_open() {
+        if !self.rate.open()? {
             return Ok(());
         }
-        self.line.open()?;
         self.decoder = Decoder::default();
-        self.drive = Drive::new(self.config.drive);
-        self.continuity.forget();
         let greeted = self.greet();
         if greeted.is_err() {
-            self.line.close();
+            self.rate.line.close();
         }
         greeted
     }
@@ -106,7 +98,7 @@ impl Firmata {
             if let Message::Version(major, minor) = message { Some((major, minor)) } else { None }
         })?;
         // Whatever ran before, the motor stands while the rest is found out.
-        self.line.send(&Command::Mode(pwm_pin, PinMode::Pwm).encode())?;
+        self.rate.line.send(&Command::Mode(pwm_pin, PinMode::Pwm).encode())?;
         self.set_output(0, false)?;
         let capabilities = self.query(Command::Capabilities, |message| {
             if let Message::Capabilities(pins) = message { Some(pins) } else { None }
@@ -118,7 +110,8 @@ impl Firmata {
             channels.iter().position(|&of| of == Some(channel)).and_then(|pin| u8::try_from(pin).ok());
         let full = |bits: u8| f64::from((1_u32 << bits.min(14)) - 1);
         let lacks = |pin: &str, what: &str| {
-            self.line
+            self.rate
+                .line
                 .error(DeviceErrorKind::Fault, format!("{pin} cannot {what} on this board; choose another"))
         };
         let analog_pin = analog_pin.ok_or_else(|| lacks(&format!("channel A{channel}"), "be found"))?;
@@ -136,13 +129,12 @@ impl Firmata {
             Command::SamplingInterval(INTERVAL_MS),
             Command::Report(channel, true),
         ] {
-            self.line.send(&command.encode())?;
+            self.rate.line.send(&command.encode())?;
         }
-        // The first reading tells where the lens is.
         let sample = self.reading()?;
-        self.drive.follow(sample.replied, sample.position).unwrap_or_default();
+        self.rate.begin_at(&sample);
         tracing::info!(
-            port = self.line.place(), version = ?version, reading_bits, duty_bits, position = %sample.position, "Firmata board"
+            port = self.rate.line.place(), version = ?version, reading_bits, duty_bits, position = %sample.position, "Firmata board"
         );
         Ok(())
     }
@@ -150,15 +142,15 @@ impl Firmata {
     /// Sends `question` until `pick` finds the answer among the messages.
     fn query<T>(&mut self, question: Command, pick: impl Fn(Message) -> Option<T>) -> Result<T, DeviceError> {
         for _ in 0..ATTEMPTS {
-            self.line.drain()?;
-            self.line.send(&question.encode())?;
-            let deadline = self.line.now() + BOOTING;
+            self.rate.line.drain()?;
+            self.rate.line.send(&question.encode())?;
+            let deadline = self.rate.line.now() + BOOTING;
             while let Some((message, _)) = self.next(deadline)? {
                 if let Some(answer) = pick(message) {
                     return Ok(answer);
                 }
                 // A stream of readings must not hold this up for ever.
-                if self.line.now() >= deadline {
+                if self.rate.line.now() >= deadline {
                     break;
                 }
             }
@@ -167,14 +159,14 @@ impl Firmata {
             "no answer to {question:?} within {BOOTING:?}, asked {ATTEMPTS} times; check the cable, and that the board runs \
              StandardFirmata at {BAUD} baud"
         );
-        Err(self.line.error(DeviceErrorKind::TimedOut, what))
+        Err(self.rate.line.error(DeviceErrorKind::TimedOut, what))
     }
 
     /// The next message and its arrival, or nothing by `deadline`.
     fn next(&mut self, deadline: HostMicros) -> Result<Option<(Message, HostMicros)>, DeviceError> {
-        while let Some(byte) = self.line.next_byte(deadline)? {
+        while let Some(byte) = self.rate.line.next_byte(deadline)? {
             if let Some(message) = self.decoder.push(byte) {
-                return Ok(Some((message, self.line.now())));
+                return Ok(Some((message, self.rate.line.now())));
             }
         }
         Ok(None)
@@ -182,8 +174,8 @@ impl Firmata {
 
     /// The first reading that arrives from now on: those that wait already are old, nobody knows how old.
     fn reading(&mut self) -> Result<LensSample, DeviceError> {
-        let called = self.line.now();
-        while self.next(called)?.is_some() && self.line.now() < called + SILENCE {}
+        let called = self.rate.line.now();
+        while self.next(called)?.is_some() && self.rate.line.now() < called + SILENCE {}
         let deadline = called + SILENCE;
         while let Some((message, replied)) = self.next(deadline)? {
             if let Message::Analog { channel, value } = message
@@ -202,7 +194,7 @@ impl Firmata {
             "no reading of channel A{} within {SILENCE:?}; the motor is cut off. Was the board reset?",
             self.config.channel
         );
-        Err(self.line.error(DeviceErrorKind::TimedOut, what))
+        Err(self.rate.line.error(DeviceErrorKind::TimedOut, what))
     }
 
     /// Sets the pins; direction first, so that a drive never begins the wrong way.
@@ -213,7 +205,7 @@ impl Firmata {
             bytes.extend(Command::Digital(direction_pin, positive).encode());
         }
         bytes.extend(Command::Pwm(pwm_pin, duty).encode());
-        self.line.send(&bytes)?;
+        self.rate.line.send(&bytes)?;
         self.output = (duty, positive);
         Ok(())
     }
@@ -227,36 +219,22 @@ impl Firmata {
 
     /// Cuts the motor off, whatever was sent before.
     fn cut(&mut self) -> Result<(), DeviceError> {
-        let now = self.line.now();
-        self.drive.cut(now);
+        self.rate.cut();
         self.set_output(0, self.output.1)
     }
 
     /// Reads, checks, and takes a step of the loop.
     fn steer(&mut self) -> Result<LensSample, DeviceError> {
         let sample = self.reading()?;
-        if let Err(what) = self.continuity.check(sample.replied, sample.position) {
-            return Err(self.line.error(DeviceErrorKind::Fault, what));
-        }
-        let drive = self
-            .drive
-            .follow(sample.replied, sample.position)
-            .map_err(|fault| self.line.error(DeviceErrorKind::Fault, fault.explain(sample.position)))?;
+        let drive = self.rate.step(&sample)?;
         self.put_out(drive)?;
-        Ok(LensSample { moving: self.drive.is_moving(), ..sample })
+        Ok(LensSample { moving: self.rate.is_moving(), ..sample })
     }
 }
 
 impl Lens for Firmata {
     fn info(&self) -> LensInfo {
-        let DriveConfig { range, max_speed, .. } = *self.drive.config();
-        LensInfo {
-            model: "Firmata board".to_owned(),
-            serial: self.line.place().to_owned(),
-            range,
-            max_speed,
-            needs_homing: false,
-        }
+        self.rate.info(self.rate.line.place())
     }
 
     fn home(&mut self) -> Result<(), DeviceError> {
@@ -264,9 +242,9 @@ impl Lens for Firmata {
     }
 
     fn move_to(&mut self, target: LensPosition, speed: LensSpeed) -> Result<(), DeviceError> {
-        self.line.check_target(target, self.config.drive.range)?;
+        self.rate.check_target(target)?;
         self.ready()?;
-        self.drive.aim(target, speed);
+        self.rate.aim(target, speed);
         Ok(())
     }
 
@@ -284,7 +262,7 @@ impl Lens for Firmata {
             }
             if fault.kind == DeviceErrorKind::TimedOut {
                 // A board that was reset streams nothing until it is set up again.
-                self.line.close();
+                self.rate.line.close();
             }
         }
         steered
@@ -293,7 +271,7 @@ impl Lens for Firmata {
 
 impl Drop for Firmata {
     fn drop(&mut self) {
-        if self.line.is_open()
+        if self.rate.line.is_open()
             && let Err(error) = self.cut()
         {
             tracing::warn!(%error, "the lens could not be stopped");

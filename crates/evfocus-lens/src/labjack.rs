@@ -14,9 +14,9 @@ use evfocus_core::{LensPosition, LensSample, LensSpeed};
 use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 use crate::Port;
-use crate::continuity::Continuity;
-use crate::drive::{Drive, DriveConfig};
-use crate::line::{Line, Patience, Timed};
+use crate::drive::DriveConfig;
+use crate::line::{Patience, Timed};
+use crate::rate_drive::RateDrive;
 
 /// TCP port.
 pub const PORT: u16 = 502;
@@ -42,14 +42,12 @@ pub struct LabJackConfig {
 /// A lens behind a LabJack.
 #[derive(Debug)]
 pub struct LabJack {
-    line: Line,
+    rate: RateDrive,
     config: LabJackConfig,
     serial: String,
-    drive: Drive,
     transaction: u16,
     /// What is on the outputs.
     output: [f32; 2],
-    continuity: Continuity,
 }
 
 impl LabJack {
@@ -59,28 +57,23 @@ impl LabJack {
     /// What keeps it from connecting, or that something else answers.
     pub fn open(port: Port, config: LabJackConfig, clock: Arc<dyn Clock>) -> Result<Self, DeviceError> {
         let mut lens = Self {
-            line: Line::new("LabJack", port, clock),
+            rate: RateDrive::new("LabJack", port, config.drive, clock),
             config,
             serial: String::new(),
-            drive: Drive::new(config.drive),
             transaction: 0,
             output: [0.0; 2],
-            continuity: Continuity::new(config.drive.range, config.drive.max_speed),
         };
         lens.ready()?;
         Ok(lens)
     }
 
     fn ready(&mut self) -> Result<(), DeviceError> {
-        if self.line.is_open() {
+        if !self.rate.open()? {
             return Ok(());
         }
-        self.line.open()?;
-        self.drive = Drive::new(self.config.drive);
-        self.continuity.forget();
         let greeted = self.greet();
         if greeted.is_err() {
-            self.line.close();
+            self.rate.line.close();
         }
         greeted
     }
@@ -92,16 +85,15 @@ impl LabJack {
                 "its test register reads {test:#010x}, not {:#010x}: this is no LabJack of the T series",
                 protocol::TEST_VALUE
             );
-            return Err(self.line.error(DeviceErrorKind::Protocol, what));
+            return Err(self.rate.line.error(DeviceErrorKind::Protocol, what));
         }
         self.write([0.0, self.output[1]])?;
         let product = f32::from_be_bytes(self.read(protocol::PRODUCT)?.value);
         self.serial = u32::from_be_bytes(self.read(protocol::SERIAL)?.value).to_string();
-        // The first reading tells where the lens is.
         let sample = self.reading()?;
-        self.drive.follow(sample.replied, sample.position).unwrap_or_default();
+        self.rate.begin_at(&sample);
         tracing::info!(
-            address = self.line.place(), product, serial = self.serial, position = %sample.position, "LabJack"
+            address = self.rate.line.place(), product, serial = self.serial, position = %sample.position, "LabJack"
         );
         Ok(())
     }
@@ -114,13 +106,13 @@ impl LabJack {
     fn read(&mut self, register: u16) -> Result<Timed<[u8; 4]>, DeviceError> {
         let transaction = self.next_transaction();
         let question = protocol::read(transaction, register);
-        self.line.ask(&question, USUAL, |bytes| protocol::value(transaction, bytes))
+        self.rate.line.ask(&question, USUAL, |bytes| protocol::value(transaction, bytes))
     }
 
     fn write(&mut self, volts: [f32; 2]) -> Result<(), DeviceError> {
         let transaction = self.next_transaction();
         let question = protocol::write(transaction, protocol::OUTPUTS, &volts);
-        self.line.ask(&question, USUAL, |bytes| protocol::written(transaction, bytes))?;
+        self.rate.line.ask(&question, USUAL, |bytes| protocol::written(transaction, bytes))?;
         self.output = volts;
         Ok(())
     }
@@ -130,7 +122,7 @@ impl LabJack {
         let volts = f64::from(f32::from_be_bytes(value));
         if !volts.is_finite() {
             let what = format!("AIN{} reads {volts} V; is its range set?", self.config.channel);
-            return Err(self.line.error(DeviceErrorKind::Fault, what));
+            return Err(self.rate.line.error(DeviceErrorKind::Fault, what));
         }
         let position = self.config.drive.position(volts / self.config.reference_volts);
         Ok(LensSample { requested, replied, position, moving: false })
@@ -152,35 +144,21 @@ impl LabJack {
 
     /// Cuts the motor off, whatever was put out before.
     fn cut(&mut self) -> Result<(), DeviceError> {
-        let now = self.line.now();
-        self.drive.cut(now);
+        self.rate.cut();
         self.write([0.0, self.output[1]])
     }
 
     fn steer(&mut self) -> Result<LensSample, DeviceError> {
         let sample = self.reading()?;
-        if let Err(what) = self.continuity.check(sample.replied, sample.position) {
-            return Err(self.line.error(DeviceErrorKind::Fault, what));
-        }
-        let drive = self
-            .drive
-            .follow(sample.replied, sample.position)
-            .map_err(|fault| self.line.error(DeviceErrorKind::Fault, fault.explain(sample.position)))?;
+        let drive = self.rate.step(&sample)?;
         self.put_out(drive)?;
-        Ok(LensSample { moving: self.drive.is_moving(), ..sample })
+        Ok(LensSample { moving: self.rate.is_moving(), ..sample })
     }
 }
 
 impl Lens for LabJack {
     fn info(&self) -> LensInfo {
-        let DriveConfig { range, max_speed, .. } = *self.drive.config();
-        LensInfo {
-            model: "LabJack".to_owned(),
-            serial: self.serial.clone(),
-            range,
-            max_speed,
-            needs_homing: false,
-        }
+        self.rate.info(&self.serial)
     }
 
     fn home(&mut self) -> Result<(), DeviceError> {
@@ -188,9 +166,9 @@ impl Lens for LabJack {
     }
 
     fn move_to(&mut self, target: LensPosition, speed: LensSpeed) -> Result<(), DeviceError> {
-        self.line.check_target(target, self.config.drive.range)?;
+        self.rate.check_target(target)?;
         self.ready()?;
-        self.drive.aim(target, speed);
+        self.rate.aim(target, speed);
         Ok(())
     }
 
@@ -211,7 +189,7 @@ impl Lens for LabJack {
 
 impl Drop for LabJack {
     fn drop(&mut self) {
-        if self.line.is_open()
+        if self.rate.line.is_open()
             && let Err(error) = self.cut()
         {
             tracing::warn!(%error, "the lens could not be stopped");

@@ -16,6 +16,7 @@ mod line;
 pub mod moonlite;
 pub mod optotune;
 mod port;
+mod rate_drive;
 
 pub use firmata::Firmata;
 pub use grbl::Grbl;
