@@ -2,12 +2,15 @@
 
 mod both_ways;
 mod chosen;
+mod parts;
 
 use crate::delay::{Delay, DelayModel};
 use crate::flags::{Flag, Flags};
 use crate::report::{Failure, LegReport, Suspicion};
 use crate::search::{Method, SearchError};
 use crate::units::{LensPosition, LensRange};
+
+pub use parts::{FocusMap, TileFocus, focus_map, window_answers};
 
 use both_ways::by_structure_both_ways;
 use chosen::{Chosen, leg_flags};
@@ -277,11 +280,11 @@ mod tests {
         }
     }
 
-    fn leg(structure: &StructureAnswer) -> LegReport {
+    pub(super) fn leg(structure: &StructureAnswer) -> LegReport {
         LegReport { structure: Some(Ok(*structure)), ..LegReport::empty() }
     }
 
-    fn rules() -> Rules {
+    pub(super) fn rules() -> Rules {
         Rules::for_range(LensRange::new(LensPosition(0.0), LensPosition(3500.0)).unwrap())
     }
 

@@ -231,7 +231,7 @@ impl Controller {
         };
         let id = RunId(self.next_run);
         self.next_run += 1;
-        self.run = Some(Run::new(id, plan, lens.position, now));
+        self.run = Some(Run::new(id, plan, self.delays, lens.position, now));
         self.camera_heard = now;
         self.lens_heard = now;
         self.sweep.forget();

@@ -31,7 +31,10 @@ mod sweep;
 mod units;
 
 pub use analysis::{Analyzer, Question, SweepLimits};
-pub use answer::{Answer, Prefer, Rules, UnknownPreference, answer, is_at_edge};
+pub use answer::{
+    Answer, FocusMap, Prefer, Rules, TileFocus, UnknownPreference, answer, focus_map, is_at_edge,
+    window_answers,
+};
 pub use clock_map::{ClockEvent, ClockMap, ClockMapQuality, NoClockYet};
 pub use controller::{Controller, ControllerConfig};
 pub use counter::{CounterError, CumulativeCounter, EventCounts};

@@ -3,7 +3,7 @@
 use core::fmt;
 use core::time::Duration;
 
-use crate::answer::{Answer, Prefer};
+use crate::answer::{Answer, FocusMap, Prefer, Rules, focus_map, window_answers};
 use crate::clock_map::ClockMapQuality;
 use crate::curve::FocusCurve;
 use crate::event::Window;
@@ -433,6 +433,8 @@ pub struct RunReport {
     pub id: RunId,
     /// What was to be done.
     pub plan: FocusPlan,
+    /// By what its answers are judged.
+    pub rules: Rules,
     /// When it began.
     pub started: HostMicros,
     /// When it ended.
@@ -461,6 +463,18 @@ impl RunReport {
     /// The sweeps made, in order.
     pub fn sweeps(&self) -> impl Iterator<Item = &LegReport> {
         self.legs.iter().flatten()
+    }
+
+    /// What each window of the request says, as if it had been the one preferred.
+    pub fn windows(&self) -> impl Iterator<Item = (Window, Result<Answer, Failure>)> {
+        let [first, second] = &self.legs;
+        first.iter().flat_map(|first| window_answers(first, second.as_ref(), self.plan.method, &self.rules))
+    }
+
+    /// Where each tile of the picture is sharp; `None` without a sweep in which the picture had a peak.
+    pub fn map(&self) -> Option<FocusMap> {
+        let measured = self.answer.and_then(|answer| Some(answer.measured?.1));
+        focus_map(self.sweeps(), measured, &self.rules)
     }
 
     /// How long the run took.

@@ -25,7 +25,7 @@ pub use structure::{
 };
 
 use mirror_pairs::MirrorPairs;
-pub(crate) use structure::StructureSearch;
+pub(crate) use structure::{FAINTEST, StructureSearch};
 
 /// A focus measure together with the search that looks for its maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -17,6 +17,7 @@ mod error;
 mod focus;
 mod frame;
 mod message;
+mod parts;
 mod report;
 mod request;
 pub mod server;
@@ -26,10 +27,11 @@ mod sweep;
 pub use device::{Device, DeviceRole, DeviceState};
 pub use error::{Error, ProtocolError};
 pub use focus::{CurvePoint, FocusRequest, FocusWindow, LensRange, Progress, WindowUnit};
+pub use parts::{FocusMap, WindowAnswer};
 pub use report::{ClockMap, EventCounts, Outcome, PhaseTiming, REPORT_FORMAT, Report, RigDelay, RunDevices};
 pub use request::{Reply, Request};
 pub use status::{LastRun, Mode, Phase, State, Status};
-pub use sweep::{Curve, Direction, Estimate, FocusMap, Quality, Structure, Sweep, WindowAnswer};
+pub use sweep::{Curve, Direction, Estimate, Quality, Structure, Sweep};
 
 /// The name of the interface.
 pub const INTERFACE: &str = "org.evfocus.Controller";

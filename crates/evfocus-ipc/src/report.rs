@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{FocusRequest, Phase, State, Sweep};
+use crate::{FocusMap, FocusRequest, Phase, State, Sweep, WindowAnswer};
 
 /// The value of [`Report::format`] that this version writes. It grows only when a field changes its meaning or goes away;
 /// new fields do not count, readers ignore what they do not know.
@@ -27,6 +27,12 @@ pub struct Report {
     pub result: Outcome,
     /// The sweeps, in order.
     pub sweeps: Vec<Sweep>,
+    /// What the windows of the request say, in their order.
+    #[serde(default)]
+    pub windows: Vec<WindowAnswer>,
+    /// Where each part of the picture is sharp; nothing if no sweep had a peak in its fine structure.
+    #[serde(default)]
+    pub map: Option<FocusMap>,
     /// Half the difference of the two directions' answers, as a time at the sweep's speed, in microseconds: lag plus
     /// backlash. Nothing without two answers.
     pub delay_us: Option<f64>,

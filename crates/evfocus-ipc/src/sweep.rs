@@ -19,19 +19,13 @@ pub struct Sweep {
     pub end_us: i64,
     /// The event rate along it.
     pub curve: Curve,
-    /// What each estimator said, whether or not it decided.
+    /// What each estimator said, whether or not it decided; those that read every event with the delay of the pixels still in it.
     pub estimators: Vec<Estimate>,
     /// Whether its counts are fit to find focus with.
     pub quality: Quality,
     /// What the fine structure of the whole picture says; nothing if it was not asked or found no peak.
     #[serde(default)]
     pub structure: Option<Structure>,
-    /// Where each part of the picture is sharp; with `structure` only.
-    #[serde(default)]
-    pub map: Option<FocusMap>,
-    /// What the windows of the request say, in their order.
-    #[serde(default)]
-    pub windows: Vec<WindowAnswer>,
 }
 
 /// What the fine structure of a picture says of one sweep. Positions have the delay of the pixels still in them.
@@ -51,45 +45,6 @@ pub struct Structure {
     pub second_depth: Option<f64>,
     /// Passes over the events.
     pub passes: u64,
-}
-
-/// The parts of the picture, row by row from the top left; all lists have `columns` times `rows` entries. Positions have the
-/// delay of the pixels still in them.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct FocusMap {
-    /// Parts beside each other.
-    pub columns: u64,
-    /// Parts above each other.
-    pub rows: u64,
-    /// Where the part was sharpest, in counts; nothing for a part without a peak.
-    pub position: Vec<Option<f64>>,
-    /// One standard deviation of that, in counts.
-    pub error_bar: Vec<Option<f64>>,
-    /// How high the part's peak is in units of what chance makes; below 8 its position says nothing.
-    pub significance: Vec<f64>,
-}
-
-/// What a window of the request says of one sweep. Positions have the delay of the pixels still in them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct WindowAnswer {
-    /// Its first column of pixels.
-    pub x: u64,
-    /// Its first row.
-    pub y: u64,
-    /// Columns.
-    pub width: u64,
-    /// Rows.
-    pub height: u64,
-    /// [`State::Focused`] or [`State::Failed`].
-    pub state: State,
-    /// Why it found nothing, in words.
-    pub reason: Option<String>,
-    /// Where it was sharpest, in counts.
-    pub position: Option<f64>,
-    /// One standard deviation of the position, in counts, the delay of the pixels apart.
-    pub error_bar: Option<f64>,
-    /// How high the peak is in units of what chance makes.
-    pub significance: Option<f64>,
 }
 
 /// What the counts of a sweep look like.

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use evfocus_ipc::{Report, RigDelay, State, Sweep};
+use evfocus_ipc::{Report, RigDelay, State, Sweep, WindowAnswer};
 
 use crate::output::Output;
 use crate::quantity::{answer, count, half_difference, rate};
@@ -81,6 +81,7 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
         count(events.dropped_from_buffer),
         rate(report.sweeps.iter().flat_map(|sweep| &sweep.curve.rate).copied().fold(0.0, f64::max))
     )?;
+    print_windows(&report.windows, out)?;
     for sweep in &report.sweeps {
         print_sweep(sweep, out)?;
     }
@@ -90,6 +91,18 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
     let timings: Vec<String> =
         report.timings.iter().map(|timing| format!("{} {:.2} s", timing.phase, timing.seconds)).collect();
     writeln!(out, "time: {}", timings.join(", "))?;
+    Ok(())
+}
+
+/// What each window says.
+pub(crate) fn print_windows(windows: &[WindowAnswer], out: &mut Output) -> anyhow::Result<()> {
+    for (number, window) in windows.iter().enumerate() {
+        let answer = match (window.position, &window.message) {
+            (Some(position), _) => answer(position, window.error_bar, window.confidence),
+            (None, message) => format!("no answer: {}", message.as_deref().unwrap_or("unknown")),
+        };
+        writeln!(out, "window {number}: {answer}")?;
+    }
     Ok(())
 }
 
@@ -109,13 +122,6 @@ fn print_sweep(sweep: &Sweep, out: &mut Output) -> anyhow::Result<()> {
             "  peak         {:.0} counts wide, {:.0} times what chance makes; pixel noise {:.2} Hz",
             said.width, said.significance, said.noise_hz
         )?;
-    }
-    for (number, window) in sweep.windows.iter().enumerate() {
-        let answer = match (window.position, &window.reason) {
-            (Some(position), _) => answer(position, window.error_bar, None),
-            (None, reason) => format!("no answer: {}", reason.as_deref().unwrap_or("unknown")),
-        };
-        writeln!(out, "  window {number:<5} {answer}")?;
     }
     Ok(())
 }

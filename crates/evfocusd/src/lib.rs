@@ -9,6 +9,7 @@ mod device_list;
 pub mod devices;
 pub mod handle;
 pub mod logging;
+pub mod parts_report;
 mod publisher;
 mod reports;
 mod rig_delay;

@@ -1,7 +1,6 @@
 //! What one sweep says, as the socket and the files show it.
 
-use evfocus_core::search::{Bookings, StructureAnswer, TileAnswer};
-use evfocus_core::{Estimate, LegReport, Method, SearchError, Window};
+use evfocus_core::{Estimate, LegReport, Method, SearchError};
 use evfocus_ipc as ipc;
 
 /// What was counted and read off on one way.
@@ -30,8 +29,6 @@ pub(crate) fn sweep((leg, direction): (&LegReport, ipc::Direction)) -> ipc::Swee
             flicker_depth: leg.quality.flicker_depth,
         },
         structure: structure(leg),
-        map: map(leg),
-        windows: windows(leg),
     }
 }
 
@@ -47,41 +44,6 @@ pub fn structure(leg: &LegReport) -> Option<ipc::Structure> {
         second_depth: said.rival.map(|rival| rival.0),
         passes: said.passes.into(),
     })
-}
-
-/// Where each part of the picture is sharp, if `structure` found a peak in `leg`.
-pub fn map(leg: &LegReport) -> Option<ipc::FocusMap> {
-    let said = leg.structure.and_then(Result::ok)?;
-    // A tile without a peak has no place for one either.
-    let known =
-        |tile: &TileAnswer, value: f64| (tile.significance > 0.0 && value.is_finite()).then_some(value);
-    Some(ipc::FocusMap {
-        columns: Bookings::COLUMNS as u64,
-        rows: Bookings::ROWS as u64,
-        position: said.tiles.iter().map(|tile| known(tile, tile.position.0)).collect(),
-        error_bar: said.tiles.iter().map(|tile| known(tile, tile.error_bar)).collect(),
-        significance: said.tiles.iter().map(|tile| tile.significance).collect(),
-    })
-}
-
-/// What the windows of the request say of `leg`, in their order.
-pub fn windows(leg: &LegReport) -> Vec<ipc::WindowAnswer> {
-    leg.windows.iter().flatten().map(window).collect()
-}
-
-fn window((window, said): &(Window, Result<StructureAnswer, SearchError>)) -> ipc::WindowAnswer {
-    let found = said.as_ref().ok();
-    ipc::WindowAnswer {
-        x: window.x.into(),
-        y: window.y.into(),
-        width: window.width.into(),
-        height: window.height.into(),
-        state: if found.is_some() { ipc::State::Focused } else { ipc::State::Failed },
-        reason: said.as_ref().err().map(ToString::to_string),
-        position: found.map(|said| said.position.0),
-        error_bar: found.map(|said| said.scatter),
-        significance: found.map(|said| said.significance),
-    }
 }
 
 fn estimate(method: Method, said: Result<Estimate, SearchError>, events: u64) -> ipc::Estimate {

@@ -6,6 +6,7 @@ use core::time::Duration;
 use super::motion::Motion;
 use super::{APPROACHES, Action, Controller, FocusState, OnFailure, State};
 use crate::answer::{Answer, answer};
+use crate::delay::DelayModel;
 use crate::flags::Flag;
 use crate::lens_trace::LensSample;
 use crate::report::{Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport};
@@ -32,6 +33,8 @@ pub(super) struct Run {
     pub(super) legs: [Option<LegReport>; 2],
     /// Reports waiting for their sweep, so that none is allocated between its start and its result.
     spare: [Option<LegReport>; 2],
+    /// The pixels' delay as known before the run.
+    delays: DelayModel,
     answer: Option<Answer>,
     /// How far back the second sweep must go.
     enough: Option<LensPosition>,
@@ -41,7 +44,13 @@ pub(super) struct Run {
 }
 
 impl Run {
-    pub(super) fn new(id: RunId, plan: FocusPlan, position_before: LensPosition, now: HostMicros) -> Self {
+    pub(super) fn new(
+        id: RunId,
+        plan: FocusPlan,
+        delays: DelayModel,
+        position_before: LensPosition,
+        now: HostMicros,
+    ) -> Self {
         Self {
             id,
             plan,
@@ -49,6 +58,7 @@ impl Run {
             position_before,
             legs: [None, None],
             spare: [Some(LegReport::empty()), Some(LegReport::empty())],
+            delays,
             answer: None,
             enough: None,
             extensions: 0,
@@ -222,8 +232,10 @@ impl Controller {
     /// What the sweeps made say.
     fn judge(&self) -> Result<Answer, Failure> {
         let no_sweep = Failure::TooFewEvents { events: 0, needed: self.config.sweep_limits.fewest_events };
-        let Some(Run { plan, legs: [Some(first), second], .. }) = &self.run else { return Err(no_sweep) };
-        let rules = self.config.rules(plan.range, plan.prefer, self.delays);
+        let Some(Run { plan, legs: [Some(first), second], delays, .. }) = &self.run else {
+            return Err(no_sweep);
+        };
+        let rules = self.config.rules(plan.range, plan.prefer, *delays);
         answer(first, second.as_ref(), plan.method, &rules)
     }
 
@@ -363,6 +375,7 @@ impl Controller {
         self.report = Some(RunReport {
             id: run.id,
             plan: run.plan,
+            rules: self.config.rules(run.plan.range, run.plan.prefer, run.delays),
             started: run.started,
             ended: now,
             position_before: run.position_before,

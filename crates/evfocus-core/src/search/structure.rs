@@ -29,12 +29,13 @@ pub use bookings::{Bookings, Filter, TileSet};
 pub use kernel::{StructureKernel, TravelStep};
 pub use measure::{Reading, StructureMeasure};
 pub use noise::NoiseMeter;
+pub(crate) use reading::FAINTEST;
 pub use reading::LEAST_SIGNIFICANCE;
 pub use travel::Travel;
 
 pub(super) use travel::LensCursor;
 
-use reading::{CONSISTENT, FAINTEST, Found, LEAST_IF_CONSISTENT};
+use reading::{CONSISTENT, Found, LEAST_IF_CONSISTENT};
 
 /// Most windows of a request.
 pub const MOST_WINDOWS: usize = 8;

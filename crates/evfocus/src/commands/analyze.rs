@@ -11,7 +11,7 @@ use clap::Args;
 use evfocus_core::{Method, Prefer};
 use evfocus_ipc::FocusWindow;
 use evfocus_record::Format;
-use evfocusd::sweep_report;
+use evfocusd::parts_report;
 
 use crate::arguments::{choices, duration, window};
 use crate::exit::Exit;
@@ -105,9 +105,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
         plot.write(path).with_context(|| format!("{}: cannot draw the plot", path.display()))?;
     }
     if let Some(path) = &arguments.map {
-        match map_of(&analysis, arguments) {
+        match analysis.verdict.map.as_ref().map(parts_report::map) {
             Some(map) => {
-                map.write(path).with_context(|| format!("{}: cannot draw the map", path.display()))?;
+                FocusMap::new(title(arguments), &map)
+                    .write(path)
+                    .with_context(|| format!("{}: cannot draw the map", path.display()))?;
             }
             None => warn(&format!("no --map was drawn into {}: no sweep has a peak", path.display())),
         }
@@ -119,12 +121,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
         text::print(&analysis, &mut out)?;
     }
     Ok(Exit::of_run(analysis.verdict.outcome.is_ok()))
-}
-
-/// The map of all sweeps' tiles together.
-fn map_of(analysis: &RecordingAnalysis, arguments: &Arguments) -> Option<FocusMap> {
-    let maps = analysis.sweeps.iter().filter_map(|sweep| sweep_report::map(&sweep.report));
-    FocusMap::of_sweeps(title(arguments), maps)
 }
 
 /// The recording's name.

@@ -8,8 +8,8 @@ use clap::Args;
 use crate::arguments::SocketArguments;
 use crate::connection::{block_on, connect};
 use crate::exit::Exit;
-use crate::output::Output;
-use crate::plot::FocusPlot;
+use crate::output::{Output, warn};
+use crate::plot::{FocusMap, FocusPlot};
 use crate::report_text;
 
 /// Print the report of a focus run
@@ -18,7 +18,7 @@ use crate::report_text;
 Examples:
   evfocus report
   evfocus report 7 --json | jq '.sweeps[].estimators'
-  evfocus report --plot curve.svg
+  evfocus report --plot curve.svg --map map.svg
 
 Units: positions in lens counts, rates in events per second, t_us in microseconds of the camera's clock, elapsed_s in seconds.
 
@@ -29,6 +29,9 @@ pub struct Arguments {
     /// Draw the focus curve and every method's answer into this file
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
+    /// Draw where each part of the picture is sharp into this file
+    #[arg(long, value_name = "FILE.svg")]
+    map: Option<PathBuf>,
     #[command(flatten)]
     socket: SocketArguments,
 }
@@ -40,6 +43,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
         let mut plot = FocusPlot::new(format!("Run {}", report.run_id));
         plot.add_report(&report);
         plot.write(path).with_context(|| format!("{}: cannot draw the plot", path.display()))?;
+    }
+    if let Some(path) = &arguments.map {
+        match &report.map {
+            Some(map) => FocusMap::new(format!("Run {}", report.run_id), map)
+                .write(path)
+                .with_context(|| format!("{}: cannot draw the map", path.display()))?,
+            None => warn(&format!("no --map was drawn into {}: no sweep has a peak", path.display())),
+        }
     }
     let mut out = Output::new();
     if arguments.socket.json {

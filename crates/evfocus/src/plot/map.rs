@@ -1,9 +1,8 @@
-//! The focus map of a recording as an SVG picture: each part of the camera's picture in the colour of its best lens position, so that tilt
+//! The focus map of a recording or a run as an SVG picture: each part of the camera's picture in the colour of its best lens position, so that tilt
 //! and depth show at a glance; the fainter, the less sure.
 
 use std::path::Path;
 
-use evfocus_core::search::LEAST_SIGNIFICANCE;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -18,8 +17,6 @@ const TEXT: RGBColor = RGBColor(0x22, 0x22, 0x22);
 const EMPTY: RGBColor = RGBColor(0xee, 0xee, 0xee);
 /// Lower positions, the middle, higher ones. Told apart by the colour-blind too.
 const SCALE: [(f64, f64, f64); 3] = [(33.0, 102.0, 172.0), (247.0, 247.0, 247.0), (178.0, 24.0, 43.0)];
-/// A tile whose significance is lower shows nothing.
-const LEAST_SHOWN: f64 = LEAST_SIGNIFICANCE / 3.0;
 /// Positions have the full colour when they are this many error bars from the middle one, or more: noise does not look like tilt.
 const LEAST_SPAN: f64 = 5.0;
 
@@ -31,46 +28,21 @@ pub(crate) struct FocusMap {
     tiles: Vec<Option<Tile>>,
 }
 
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Tile {
     position: f64,
     error_bar: f64,
-    significance: f64,
-    sweeps: f64,
+    confidence: f64,
 }
 
 impl FocusMap {
-    /// The mean of `maps`; nothing without any.
-    pub(crate) fn of_sweeps(
-        title: String,
-        maps: impl Iterator<Item = evfocus_ipc::FocusMap>,
-    ) -> Option<Self> {
-        let mut sums: Vec<Tile> = Vec::new();
-        let mut columns = 0;
-        for map in maps {
-            columns = map.columns as usize;
-            sums.resize(map.position.len(), Tile::default());
-            for (index, sum) in sums.iter_mut().enumerate() {
-                let significance = map.significance[index];
-                let Some((position, error_bar)) = map.position[index].zip(map.error_bar[index]) else {
-                    continue;
-                };
-                if significance >= LEAST_SHOWN {
-                    sum.position += position;
-                    sum.error_bar += error_bar * error_bar;
-                    sum.significance += significance;
-                    sum.sweeps += 1.0;
-                }
-            }
-        }
-        let mean = |sum: &Tile| Tile {
-            position: sum.position / sum.sweeps,
-            error_bar: sum.error_bar.sqrt() / sum.sweeps,
-            significance: sum.significance / sum.sweeps,
-            sweeps: sum.sweeps,
+    /// A picture of `map` with this title.
+    pub(crate) fn new(title: String, map: &evfocus_ipc::FocusMap) -> Self {
+        let known = map.position.iter().zip(&map.error_bar).zip(&map.confidence);
+        let tile = |((&position, &error_bar), &confidence): ((&Option<f64>, &Option<f64>), &Option<f64>)| {
+            Some(Tile { position: position?, error_bar: error_bar?, confidence: confidence? })
         };
-        let tiles = sums.iter().map(|sum| (sum.sweeps > 0.0).then(|| mean(sum))).collect();
-        (columns > 0).then_some(Self { title, columns, tiles })
+        Self { title, columns: map.columns.max(1) as usize, tiles: known.map(tile).collect() }
     }
 
     /// Writes the map to `path`, replacing the file.
@@ -103,7 +75,7 @@ impl FocusMap {
             let (column, row) = ((index % self.columns) as i32, (index / self.columns) as i32);
             let corner = (MARGIN + column * TILE, MARGIN + CAPTION + row * TILE);
             let fill = tile.map_or(EMPTY.mix(1.0), |tile| {
-                let sure = (tile.significance / LEAST_SIGNIFICANCE).clamp(0.3, 1.0);
+                let sure = tile.confidence.clamp(0.3, 1.0);
                 color((tile.position - middle) / span).mix(sure)
             });
             draw_tile(&area, corner, fill, tile.as_ref())?;
@@ -121,7 +93,10 @@ fn draw_tile(
     let corners = [(left + 1, top + 1), (left + TILE - 1, top + TILE - 1)];
     area.draw(&Rectangle::new(corners, fill.filled())).map_err(failed)?;
     let lines = tile.map_or([(0, 13, String::from("no structure")), (0, 13, String::new())], |tile| {
-        [(-9, 20, format!("{:.0}", tile.position)), (15, 13, format!("± {:.0}", tile.error_bar))]
+        [
+            (-9, 20, format!("{:.0}", tile.position)),
+            (15, 13, format!("± {:.0}, {:.0} %", tile.error_bar, (tile.confidence * 100.0).floor())),
+        ]
     });
     for (down, size, text) in lines {
         let style =
@@ -144,27 +119,19 @@ fn color(place: f64) -> RGBColor {
 mod tests {
     use super::*;
 
-    fn map(position: f64) -> evfocus_ipc::FocusMap {
-        evfocus_ipc::FocusMap {
-            columns: 2,
-            rows: 1,
-            position: vec![Some(position), None],
-            error_bar: vec![Some(8.0), None],
-            significance: vec![40.0, 0.0],
-        }
-    }
-
     #[test]
     fn every_part_is_drawn_whatever_it_says() {
-        let map = FocusMap::of_sweeps(String::from("a & b"), [map(1230.0), map(1238.0)].into_iter()).unwrap();
+        let map = evfocus_ipc::FocusMap {
+            columns: 2,
+            rows: 1,
+            position: vec![Some(1234.0), None],
+            error_bar: vec![Some(6.0), None],
+            confidence: vec![Some(0.958), None],
+            significance: vec![Some(40.0), None],
+        };
         let mut svg = String::new();
-        map.draw(&mut svg).unwrap();
-        assert!(svg.contains("a &amp; b") && svg.contains("1234") && svg.contains("± 6"), "{svg}");
+        FocusMap::new(String::from("a & b"), &map).draw(&mut svg).unwrap();
+        assert!(svg.contains("a &amp; b") && svg.contains("1234") && svg.contains("± 6, 95 %"), "{svg}");
         assert_eq!(svg.matches("no structure").count(), 1);
-    }
-
-    #[test]
-    fn without_a_sweep_there_is_no_map() {
-        assert!(FocusMap::of_sweeps(String::new(), [].into_iter()).is_none());
     }
 }

@@ -1,6 +1,9 @@
 //! One answer from the sweeps of a recording, by the rules of the controller.
 
-use evfocus_core::{Answer, Failure, LensPosition, LensRange, Method, Prefer, Rules, SweepLimits, answer};
+use evfocus_core::{
+    Answer, Failure, FocusMap, LensPosition, LensRange, Method, Prefer, Rules, SweepLimits, Window, answer,
+    focus_map,
+};
 
 use super::SweepAnalysis;
 
@@ -9,7 +12,9 @@ use super::SweepAnalysis;
 pub(crate) struct Verdict {
     pub(crate) outcome: Result<Answer, Failure>,
     /// What each window says of all sweeps together, as if it had been the one preferred.
-    pub(crate) windows: Vec<Result<Answer, Failure>>,
+    pub(crate) windows: Vec<(Window, Result<Answer, Failure>)>,
+    /// Where each tile of the picture is sharp by all sweeps together.
+    pub(crate) map: Option<FocusMap>,
     /// Half the difference of the two directions' answers as a time: lag plus backlash.
     pub(crate) delay_us: Option<f64>,
     /// Camera time at which the first sweep passed the answer.
@@ -21,14 +26,22 @@ impl Verdict {
     pub(super) fn of(sweeps: &[SweepAnalysis], method: Method, prefer: Prefer) -> Self {
         let outcome = answer_of_all(sweeps, method, prefer);
         let (found, first) = (outcome.as_ref().ok(), sweeps.first());
-        let number = first.map_or(0, |sweep| sweep.report.windows.iter().flatten().count());
-        let of_window = |index: usize| answer_of_all(sweeps, method, Prefer::Window(index as u8));
+        let of_window =
+            |(&(window, _), index)| (window, answer_of_all(sweeps, method, Prefer::Window(index)));
         Self {
             delay_us: found.zip(first).and_then(|(found, first)| {
                 Some(found.half_difference? / first.speed.counts_per_second() * 1e6)
             }),
             t_us: found.zip(first).map(|(found, first)| first.passed(found.position, method)),
-            windows: (0..number).map(of_window).collect(),
+            windows: first
+                .iter()
+                .flat_map(|first| first.report.windows.iter().flatten().zip(0..))
+                .map(of_window)
+                .collect(),
+            map: extent(sweeps).and_then(|range| {
+                let measured = found.and_then(|found| Some(found.measured?.1));
+                focus_map(sweeps.iter().map(|sweep| &sweep.report), measured, &Rules::for_range(range))
+            }),
             outcome,
         }
     }

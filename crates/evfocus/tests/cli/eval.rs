@@ -128,7 +128,6 @@ fn windows_and_the_map_are_of_the_recording() {
     let right = analyze(&["--window", "0,0,150,260", "--window", "55%,0%,45%,100%", "--prefer", "1"]);
     assert!((position(&left) - truths[0]).abs() < 30.0 && (position(&right) - truths[1]).abs() < 30.0);
     assert_eq!((&left["window"], &right["window"]), (&0.into(), &1.into()));
-    assert_eq!(right["sweeps"][0]["windows"].as_array().unwrap().len(), 2);
     let each: Vec<f64> = right["windows"].as_array().unwrap().iter().map(position).collect();
     assert!((each[0] - truths[0]).abs() < 30.0 && (each[1] - position(&right)).abs() < 1e-9, "{each:?}");
     let off = [two.analyze().as_slice(), &["--window", "300,0,100,100"]].concat();

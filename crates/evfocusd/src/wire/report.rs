@@ -9,8 +9,8 @@ use evfocus_core::{
 use evfocus_ipc as ipc;
 
 use super::{lens_range, phase};
-use crate::sweep_report;
 use crate::threads::control::EndedRun;
+use crate::{parts_report, sweep_report};
 
 fn plan(plan: &FocusPlan, pace: Pace) -> ipc::FocusRequest {
     let pixels = |window: &Window| ipc::FocusWindow {
@@ -65,6 +65,8 @@ pub(crate) fn report(ended: &EndedRun, circumstances: Circumstances) -> ipc::Rep
             .zip([ipc::Direction::Forward, ipc::Direction::Backward])
             .map(sweep_report::sweep)
             .collect(),
+        windows: run.windows().map(parts_report::window).collect(),
+        map: run.map().as_ref().map(parts_report::map),
         delay_us: run.delay_us,
         rig_delay: Some(rig_delay(delays)),
         hot_pixels: run.hot_pixels as u64,

@@ -284,6 +284,8 @@ fn report(run_id: u64, request: FocusRequest, state: State, reason: Option<&str>
             window: None,
         },
         sweeps: Vec::new(),
+        windows: Vec::new(),
+        map: None,
         delay_us: None,
         rig_delay: None,
         hot_pixels: 0,

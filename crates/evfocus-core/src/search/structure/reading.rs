@@ -12,7 +12,7 @@ pub(super) const LEAST_IF_CONSISTENT: f64 = 10.0;
 /// How well that is: their scatter as a part of the peak's width.
 pub(super) const CONSISTENT: f64 = 0.06;
 /// An answer that is fainter is none, whoever says the same.
-pub(super) const FAINTEST: f64 = 8.0;
+pub(crate) const FAINTEST: f64 = 8.0;
 /// A tile or another reading needs less, for it is not asked whether it may be believed alone.
 const LEAST_TILE_SIGNIFICANCE: f64 = 8.0;
 /// Scatter above this part of the peak's width: the readings contradict each other.

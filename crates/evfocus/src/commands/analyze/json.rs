@@ -2,7 +2,7 @@
 
 use evfocus_core::{Answer, Estimate, Failure, Flags, LegReport, Method, SearchError, SweepQuality};
 use evfocus_ipc::{Curve, Direction, FocusMap, State, Structure, WindowAnswer};
-use evfocusd::sweep_report;
+use evfocusd::{parts_report, sweep_report};
 use serde::Serialize;
 
 use crate::recording::{RecordingAnalysis, Request, SweepAnalysis};
@@ -30,7 +30,9 @@ pub(super) struct Analysis {
     /// The number of the window that decided, from 0.
     window: Option<u8>,
     /// What each window says, in their order.
-    windows: Vec<InWindow>,
+    windows: Vec<WindowAnswer>,
+    /// Where each part of the picture is sharp.
+    map: Option<FocusMap>,
     /// When the first sweep passed the position.
     t_us: Option<f64>,
     /// Half the difference of the two directions as a time: lag plus backlash.
@@ -43,31 +45,6 @@ pub(super) struct Analysis {
     curve: Curve,
     sweeps: Vec<Sweep>,
     warnings: Vec<String>,
-}
-
-/// The answer of one window, from all sweeps together.
-#[derive(Debug, Serialize)]
-struct InWindow {
-    state: State,
-    reason: Option<&'static str>,
-    position: Option<f64>,
-    error_bar: Option<f64>,
-    confidence: Option<f64>,
-    flags: Vec<&'static str>,
-}
-
-impl InWindow {
-    fn of(outcome: &Result<Answer, Failure>) -> Self {
-        let found = outcome.as_ref().ok();
-        Self {
-            state: state(outcome.is_ok()),
-            reason: outcome.as_ref().err().map(Failure::name),
-            position: found.map(|answer| answer.position.0),
-            error_bar: found.and_then(|answer| answer.error_bar),
-            confidence: found.and_then(|answer| answer.confidence),
-            flags: names(found.map(|answer| answer.flags).unwrap_or_default()),
-        }
-    }
 }
 
 #[derive(Debug, Serialize)]
@@ -93,8 +70,6 @@ struct Sweep {
     estimators: Vec<Estimator>,
     /// What the fine structure says; positions with the delay of the pixels still in them.
     structure: Option<Structure>,
-    map: Option<FocusMap>,
-    windows: Vec<WindowAnswer>,
     quality: Quality,
     curve: Curve,
 }
@@ -150,7 +125,8 @@ impl Analysis {
             decided_by: found.map(|answer| answer.decided_by.name()),
             second_depth: found.and_then(|answer| Some(answer.second_depth?.0)),
             window: found.and_then(|answer| answer.window),
-            windows: analysis.verdict.windows.iter().map(InWindow::of).collect(),
+            windows: analysis.verdict.windows.iter().copied().map(parts_report::window).collect(),
+            map: analysis.verdict.map.as_ref().map(parts_report::map),
             t_us: analysis.verdict.t_us,
             delay_us: analysis.verdict.delay_us,
             events: sweeps.iter().map(|sweep| sweep.events).sum(),
@@ -189,8 +165,6 @@ impl Sweep {
             iterations: said.map_or(0, |estimate| estimate.iterations.into()),
             estimators: estimators(report),
             structure: sweep_report::structure(report),
-            map: sweep_report::map(report),
-            windows: sweep_report::windows(report),
             quality: Quality::of(&report.quality, report.peak_rate.0),
             curve: curve(report),
         }

@@ -3,10 +3,12 @@
 use std::io::Write;
 
 use evfocus_core::Method;
+use evfocusd::parts_report;
 
 use crate::output::Output;
 use crate::quantity::{answer, count, half_difference, rate, seconds};
 use crate::recording::{RecordingAnalysis, SweepAnalysis};
+use crate::report_text::print_windows;
 
 pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::Result<()> {
     match &analysis.verdict.outcome {
@@ -29,6 +31,8 @@ pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::R
         let speed = analysis.sweeps.first().map(|sweep| sweep.speed.counts_per_second());
         writeln!(out, "{}", half_difference(delay_us, speed))?;
     }
+    let windows: Vec<_> = analysis.verdict.windows.iter().copied().map(parts_report::window).collect();
+    print_windows(&windows, out)?;
     for sweep in &analysis.sweeps {
         print_sweep(sweep, analysis.method, out)?;
     }
