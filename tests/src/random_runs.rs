@@ -289,7 +289,7 @@ pub enum Verdict {
     SaidToBeUncertain,
     /// Failed, with a reason that tells of what stood in the way.
     FailedRightly,
-    /// Failed with a reason that speaks of the scene although nothing was planted.
+    /// Failed with a reason that speaks of the scene, whatever was planted.
     GaveUp,
     /// Wrong, and sure of it.
     Wrong,

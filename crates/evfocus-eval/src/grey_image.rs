@@ -3,6 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
+use image::{ImageBuffer, Luma};
+use imageproc::kernel::Kernel;
+
+/// A picture as the library for filters has it.
+type Luma64 = ImageBuffer<Luma<f64>, Vec<f64>>;
 
 /// A grey picture: values from 0 (black) to 1 (white), row by row.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,31 +66,19 @@ impl GreyImage {
         &mut self.values
     }
 
-    /// What `taps` make of the picture: at each pixel the sum of weight times the value that many columns to the right and rows
-    /// down. Beyond the margins the outermost pixels repeat.
+    /// The correlation with a filter of these rows of weights, whose middle belongs to the pixel. Beyond the margins the outermost pixels
+    /// repeat.
     #[must_use]
-    pub fn correlate(&self, taps: &[Tap]) -> Self {
-        let (width, height) = (self.width, self.height());
-        let reach = taps.iter().map(|tap| tap.right.abs().max(tap.down.abs())).max().unwrap_or(0);
-        let margin = reach.unsigned_abs();
-        let stride = width + 2 * margin;
-        let mut padded = Vec::with_capacity(stride * height);
-        for row in self.values.chunks_exact(width) {
-            padded.extend(std::iter::repeat_n(row[0], margin));
-            padded.extend_from_slice(row);
-            padded.extend(std::iter::repeat_n(row[width - 1], margin));
-        }
-        let mut out = vec![0.0; self.values.len()];
-        for (y, out) in out.chunks_exact_mut(width).enumerate() {
-            for tap in taps {
-                let source = y.saturating_add_signed(tap.down).min(height - 1) * stride;
-                let start = source + margin.saturating_add_signed(tap.right);
-                for (out, value) in out.iter_mut().zip(&padded[start..start + width]) {
-                    *out += tap.weight * value;
-                }
-            }
-        }
-        Self::new(width, out)
+    pub fn correlate<const WIDTH: usize, const HEIGHT: usize>(
+        &self,
+        filter: &[[f64; WIDTH]; HEIGHT],
+    ) -> Self {
+        const { assert!(WIDTH % 2 == 1 && HEIGHT % 2 == 1, "a filter needs a middle") }
+        let (width, height) = (self.width as u32, self.height() as u32);
+        let Some(image) = Luma64::from_raw(width, height, self.values.clone()) else { return self.clone() };
+        let kernel = Kernel::new(filter.as_flattened(), WIDTH as u32, HEIGHT as u32);
+        let filtered: Luma64 = imageproc::filter::filter(&image, kernel, |value: f64| value);
+        Self::new(self.width, filtered.into_raw())
     }
 
     /// The mean of what `measure` makes of each value.
@@ -98,39 +91,16 @@ impl GreyImage {
         self.mean_of(|value| value)
     }
 
-    /// Mean over the square of `side` pixels around each pixel.
-    pub(crate) fn box_mean(&self, side: usize) -> Self {
-        let reach = (side / 2) as isize;
-        let weight = 1.0 / side as f64;
-        let along: Vec<Tap> = (-reach..=reach).map(|right| Tap { right, down: 0, weight }).collect();
+    /// Mean over the square of `SIDE` pixels, an odd number, around each pixel.
+    pub(crate) fn box_mean<const SIDE: usize>(&self) -> Self {
+        let along = [[1.0 / SIDE as f64; SIDE]];
         self.correlate(&along).correlate(&transposed(&along))
     }
 }
 
-/// One weight of a filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tap {
-    /// Columns to the right of the pixel.
-    pub right: isize,
-    /// Rows below the pixel.
-    pub down: isize,
-    /// Its weight.
-    pub weight: f64,
-}
-
 /// The filter with columns and rows exchanged.
-pub(crate) fn transposed(taps: &[Tap]) -> Vec<Tap> {
-    taps.iter().map(|tap| Tap { right: tap.down, down: tap.right, weight: tap.weight }).collect()
-}
-
-/// A filter from the rows of its weights, the middle of which (for even numbers the one before) belongs to the pixel.
-pub(crate) fn kernel<const WIDTH: usize>(rows: &[[f64; WIDTH]]) -> Vec<Tap> {
-    let (middle_x, middle_y) = (((WIDTH - 1) / 2) as isize, ((rows.len() - 1) / 2) as isize);
-    let mut taps = Vec::new();
-    for (y, row) in rows.iter().enumerate() {
-        for (x, &weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
-            taps.push(Tap { right: x as isize - middle_x, down: y as isize - middle_y, weight });
-        }
-    }
-    taps
+pub(crate) fn transposed<const WIDTH: usize, const HEIGHT: usize>(
+    filter: &[[f64; WIDTH]; HEIGHT],
+) -> [[f64; HEIGHT]; WIDTH] {
+    std::array::from_fn(|x| std::array::from_fn(|y| filter[y][x]))
 }

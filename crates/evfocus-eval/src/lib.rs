@@ -23,5 +23,5 @@ pub mod tables;
 pub use cache::Cache;
 pub use candidate::Candidate;
 pub use evaluate::evaluate;
-pub use grey_image::{GreyImage, Tap};
+pub use grey_image::GreyImage;
 pub use operators::Operator;

@@ -95,14 +95,10 @@ fn natural(seed: f64) -> GreyImage {
 }
 
 fn blurred(image: &GreyImage, sigma: f64) -> GreyImage {
-    use evfocus_eval::Tap;
     let weight = |at: isize| (-0.5 * (at as f64 / sigma).powi(2)).exp();
     let total: f64 = (-12..=12).map(weight).sum();
-    let along: Vec<Tap> =
-        (-12..=12).map(|right| Tap { right, down: 0, weight: weight(right) / total }).collect();
-    let down: Vec<Tap> =
-        along.iter().map(|tap| Tap { right: 0, down: tap.right, weight: tap.weight }).collect();
-    image.correlate(&along).correlate(&down)
+    let weights: [f64; 25] = std::array::from_fn(|index| weight(index as isize - 12) / total);
+    image.correlate(&[weights]).correlate(&weights.map(|weight| [weight]))
 }
 
 #[test]

@@ -17,7 +17,7 @@ use super::{Condition, Dataset, Entry, Label, Sequence, Source, Unit};
 pub const TRUTH_FILE: &str = "gt_focus_points.txt";
 /// The data set's camera, a DAVIS346.
 const GEOMETRY: Geometry = Geometry { width: 346, height: 260 };
-/// A sample of the lens position is taken from the first event of each millisecond.
+/// A sample of the lens position is taken from the first event of each millisecond, and from the last event of all.
 const SAMPLE_US: i64 = 1_000;
 
 /// The sequences below `folder`.
@@ -100,14 +100,20 @@ fn name_and_truth(path: &Path, root: &Path, truths: &[(String, f64)]) -> anyhow:
 pub fn read(path: &Path, truth: f64) -> anyhow::Result<Sequence> {
     let shown = path.display();
     let name = path.to_str().with_context(|| format!("{shown}: the path is not UTF-8; rename it"))?;
-    let file = matrw::load_matfile(name).map_err(|error| {
-        if !matches!(error, MatrwError::MatFile73Error) {
-            return anyhow::anyhow!("{shown}: not a MAT file of version 7: {error}");
-        }
-        anyhow::anyhow!(
+    let file = matrw::load_matfile(name).map_err(|error| match error {
+        MatrwError::MatFile73Error => anyhow::anyhow!(
             "{shown}: a MAT file of version 7.3 (HDF5), which evfocus does not read; convert it in MATLAB: \
              load('{shown}'); save('{shown}', 'aedat', '-v7')"
-        )
+        ),
+        MatrwError::IoError(error) => anyhow::anyhow!("{shown}: cannot read: {error}"),
+        // What it says of itself is pages long.
+        MatrwError::BinrwError(_)
+        | MatrwError::AccessError(_)
+        | MatrwError::SerdeError(_)
+        | MatrwError::TypeConstruction(_) => anyhow::anyhow!(
+            "{shown}: not a MAT file of version 7 as MATLAB writes it, or it is damaged; save it in MATLAB: \
+             load('{shown}'); save('{shown}', 'aedat', '-v7')"
+        ),
     })?;
     let column = |field: &str| {
         numbers(&file, field).with_context(|| format!("{shown}: no numbers in aedat.data.polarity.{field}"))
@@ -133,6 +139,9 @@ pub fn read(path: &Path, truth: f64) -> anyhow::Result<Sequence> {
             trace.push_if_later(t, LensPosition(positions[index]));
             sample_due = CameraMicros(t.0 + SAMPLE_US);
         }
+    }
+    if let (Some(last), Some(&position)) = (events.last(), positions.last()) {
+        trace.push_if_later(last.t, LensPosition(position));
     }
     events.sort_by_key(|event| event.t);
     Ok(Sequence { geometry: GEOMETRY, events, trace, truths: vec![truth], frames: None })

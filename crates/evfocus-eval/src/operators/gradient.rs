@@ -4,12 +4,12 @@ use std::f64::consts::TAU;
 
 use super::WINDOW;
 use crate::GreyImage;
-use crate::grey_image::{Tap, kernel, transposed};
+use crate::grey_image::transposed;
 
 /// GRAD: Tenengrad, the mean of Gx^2 + Gy^2 with Sobel's filters, which is what the paper's citation means: J. M. Tenenbaum,
 /// "Accommodation in computer vision", thesis, Stanford University (1971). The survey has it as GRA6.
 pub(super) fn tenengrad(image: &GreyImage) -> f64 {
-    let sobel = kernel(&[[-1.0, 0.0, 1.0], [-2.0, 0.0, 2.0], [-1.0, 0.0, 1.0]]);
+    let sobel = [[-1.0, 0.0, 1.0], [-2.0, 0.0, 2.0], [-1.0, 0.0, 1.0]];
     let filters = [image.correlate(&sobel), image.correlate(&transposed(&sobel))];
     filters.iter().map(|response| response.mean_of(|value| value * value)).sum()
 }
@@ -21,8 +21,8 @@ pub(super) fn steerable(image: &GreyImage) -> f64 {
     let reach = (WINDOW / 2) as isize;
     let variance = (reach as f64 / 3.0).powi(2);
     let profile = |at: isize| (-0.5 * (at * at) as f64 / variance).exp() / (TAU * variance).sqrt();
-    let along = |weight: &dyn Fn(isize) -> f64| -> Vec<Tap> {
-        (-reach..=reach).map(|right| Tap { right, down: 0, weight: weight(right) }).collect()
+    let along = |weight: &dyn Fn(isize) -> f64| -> [[f64; WINDOW]; 1] {
+        [std::array::from_fn(|index| weight(index as isize - reach))]
     };
     let smooth = along(&profile);
     let slope = along(&|at| at as f64 / variance * profile(at));

@@ -7,7 +7,7 @@ use crate::GreyImage;
 /// pixel counts as 1. F. S. Helmli, S. Scherer, "Adaptive shape from focus with an error estimation in light microscopy", Int. Symp. on
 /// Image and Signal Processing and Analysis (2001) 188-193.
 pub(super) fn helmli_mean(image: &GreyImage) -> f64 {
-    let means = image.box_mean(WINDOW);
+    let means = image.box_mean::<WINDOW>();
     let ratio = |(&value, &mean): (&f64, &f64)| {
         if value <= 0.0 { 1.0 } else { (value / mean).max(mean / value) }
     };
@@ -18,9 +18,9 @@ pub(super) fn helmli_mean(image: &GreyImage) -> f64 {
 /// GLLV: variance over the pixels of the variance within the window around each. J. L. Pech-Pacheco, G. Cristobal, J. Chamorro-Martinez,
 /// J. Fernandez-Valdivia, "Diatom autofocusing in brightfield microscopy: a comparative study", ICPR (2000) 3:314-317.
 pub(super) fn local_variance(image: &GreyImage) -> f64 {
-    let means = image.box_mean(WINDOW);
+    let means = image.box_mean::<WINDOW>();
     let squares = GreyImage::new(image.width(), image.values().iter().map(|value| value * value).collect());
-    let mut variances = squares.box_mean(WINDOW);
+    let mut variances = squares.box_mean::<WINDOW>();
     for (variance, mean) in variances.values_mut().iter_mut().zip(means.values()) {
         *variance -= mean * mean;
     }

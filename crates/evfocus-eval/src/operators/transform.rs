@@ -3,7 +3,6 @@
 use nalgebra::DMatrix;
 
 use crate::GreyImage;
-use crate::grey_image::kernel;
 
 /// Highest order of the Chebyshev moments that count as low.
 const LOW_ORDER: usize = 2;
@@ -49,12 +48,14 @@ pub(super) fn eigenvalues(image: &GreyImage) -> f64 {
 /// The survey's public code averages the response with its sign, which leaves nothing but the margins of the picture, since the weights
 /// add up to zero; if the paper used that, its figures for DCTM say little of the operator.
 pub(super) fn cosine(image: &GreyImage) -> f64 {
-    let mask = kernel(&[
-        [1.0, 1.0, -1.0, -1.0],
-        [1.0, 1.0, -1.0, -1.0],
-        [-1.0, -1.0, 1.0, 1.0],
-        [-1.0, -1.0, 1.0, 1.0],
-    ]);
+    // Of the even number of weights, the second in each direction belongs to the pixel.
+    let mask = [
+        [0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 1.0, -1.0, -1.0],
+        [0.0, 1.0, 1.0, -1.0, -1.0],
+        [0.0, -1.0, -1.0, 1.0, 1.0],
+        [0.0, -1.0, -1.0, 1.0, 1.0],
+    ];
     image.correlate(&mask).mean_of(|value| value * value)
 }
 
