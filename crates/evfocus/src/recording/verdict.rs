@@ -67,9 +67,11 @@ fn answer_of_all(sweeps: &[SweepAnalysis], method: Method, prefer: Prefer) -> Re
             [] => Err(nothing),
         })
         .collect::<Result<_, _>>()?;
-    let first = answers.first().ok_or(nothing)?;
     let mean = answers.iter().map(|answer| answer.position.0).sum::<f64>() / answers.len() as f64;
-    Ok(Answer { position: LensPosition(mean), ..*first })
+    // Several pairs of sweeps are together no surer than the least sure of them: what they err by alike does not average out.
+    let error_bar = |answer: &Answer| answer.error_bar.unwrap_or(f64::INFINITY);
+    let least_sure = answers.iter().max_by(|a, b| error_bar(a).total_cmp(&error_bar(b))).ok_or(nothing)?;
+    Ok(Answer { position: LensPosition(mean), ..*least_sure })
 }
 
 /// The positions swept.
