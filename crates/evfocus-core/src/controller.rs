@@ -122,6 +122,17 @@ impl Controller {
         &self.config
     }
 
+    /// Takes new settings for the runs to come, for the same lens. What runs have taught stays. Allocates; a run under way must
+    /// end first, so `false` means that nothing has changed.
+    pub fn reconfigure(&mut self, config: ControllerConfig) -> bool {
+        if self.run.is_some() {
+            return false;
+        }
+        self.sweep = SweepState::new(self.geometry, &config);
+        self.config = config;
+        true
+    }
+
     /// The next run gets this number or a higher one: numbers go on after a restart.
     pub fn number_runs_from(&mut self, first: RunId) {
         self.next_run = self.next_run.max(first.0);

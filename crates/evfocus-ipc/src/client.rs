@@ -15,6 +15,7 @@ use tokio::time::timeout;
 
 pub use error::ClientError;
 pub use follow::{Following, News};
+pub use results::Reloaded;
 
 use crate::frame::{FrameReader, encode};
 use crate::message::{Call, Incoming};
@@ -96,6 +97,11 @@ impl Client {
     /// The cameras and lenses in use, attached or configured.
     pub async fn devices(&mut self) -> Result<Vec<Device>, ClientError> {
         Ok(self.call::<results::OfDevices>(&Request::ListDevices).await?.devices)
+    }
+
+    /// Has the daemon read its configuration anew.
+    pub async fn reload(&mut self) -> Result<Reloaded, ClientError> {
+        self.call(&Request::Reload).await
     }
 
     async fn call<Results: DeserializeOwned>(&mut self, request: &Request) -> Result<Results, ClientError> {

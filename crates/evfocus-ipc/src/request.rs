@@ -39,6 +39,8 @@ pub enum Request {
     },
     /// Which devices are there?
     ListDevices,
+    /// Read the configuration anew.
+    Reload,
 }
 
 /// What a call of one of the interface's methods is answered with.
@@ -70,14 +72,21 @@ pub enum Reply {
         /// The run that was stopped; nothing if none was under way.
         run_id: Option<u64>,
     },
+    /// To `Reload`.
+    Reloaded {
+        /// The settings that have changed and hold from now on.
+        applied: Vec<String>,
+        /// The settings that have changed and hold after a restart.
+        needs_restart: Vec<String>,
+    },
     /// To the methods without results.
     Done {},
 }
 
 impl Request {
     /// The names of the interface's methods.
-    pub const NAMES: [&str; 8] =
-        ["GetStatus", "Focus", "Abort", "MoveTo", "SetMode", "Monitor", "GetReport", "ListDevices"];
+    pub const NAMES: [&str; 9] =
+        ["GetStatus", "Focus", "Abort", "MoveTo", "SetMode", "Monitor", "GetReport", "ListDevices", "Reload"];
 
     /// The method called `name` with `parameters`; nothing if there is no such method.
     pub(crate) fn parse(name: &str, parameters: Map<String, Value>) -> Option<Result<Self, Error>> {
@@ -91,6 +100,7 @@ impl Request {
             "Monitor" => Ok(Self::Monitor),
             "GetReport" => arguments.take("id").map(|id| Self::GetReport { id }),
             "ListDevices" => Ok(Self::ListDevices),
+            "Reload" => Ok(Self::Reload),
             _ => return None,
         };
         Some(request.and_then(|request| arguments.finish().map(|()| request)))
@@ -107,13 +117,24 @@ impl Request {
             Self::Monitor => "Monitor",
             Self::GetReport { .. } => "GetReport",
             Self::ListDevices => "ListDevices",
+            Self::Reload => "Reload",
+        }
+    }
+
+    /// Whether it does something, rather than tell.
+    pub fn controls(&self) -> bool {
+        match self {
+            Self::Focus(_) | Self::Abort | Self::MoveTo { .. } | Self::SetMode { .. } | Self::Reload => true,
+            Self::GetStatus | Self::Monitor | Self::GetReport { .. } | Self::ListDevices => false,
         }
     }
 
     /// The method's arguments.
     pub(crate) fn parameters(&self) -> Result<Map<String, Value>, serde_json::Error> {
         let value = match self {
-            Self::GetStatus | Self::Abort | Self::Monitor | Self::ListDevices => return Ok(Map::new()),
+            Self::GetStatus | Self::Abort | Self::Monitor | Self::ListDevices | Self::Reload => {
+                return Ok(Map::new());
+            }
             Self::Focus(request) => serde_json::to_value(request)?,
             Self::MoveTo { position } => serde_json::json!({ "position": position }),
             Self::SetMode { mode } => serde_json::json!({ "mode": mode }),

@@ -1,25 +1,30 @@
 //! The server: one task for each connection, so that no client can delay another, and a bound on everything that a
 //! client can make grow.
 //!
-//! What is bounded: the number of connections, the length of a call, the time from a call's first byte to its last, the
-//! time that a reply may take to be written. A client that breaks a bound is disconnected. A connection has no queue: the
+//! What is bounded: the number of connections, of all and of each user, the length of a call, the time from a call's first byte
+//! to its last, the time that a reply may take to be written. A client that breaks a bound is disconnected; one that calls too
+//! often is served late. A connection has no queue: the
 //! next call is read when the one before has been answered, and a stream's next reply is made when the one before has been
 //! written; in between, the kernel's socket buffers hold what they hold.
 
 mod bind;
 mod connection;
+mod peer;
+mod rate;
 mod varlink;
 
+use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::net::{UnixListener, UnixStream};
-use tokio::task::JoinSet;
+use tokio::task::{Id, JoinError, JoinSet};
 use tokio::time::{sleep, timeout};
 
 pub use bind::{BindError, Socket};
 pub use connection::{CallError, Stream};
+pub use peer::Peer;
 pub use varlink::Info;
 
 use crate::frame::encode;
@@ -30,13 +35,14 @@ pub trait Service: Send + Sync + 'static {
     /// Who is serving, for `org.varlink.service.GetInfo`.
     fn info(&self) -> Info;
 
-    /// Answers a call: with the last reply, or an error. Replies before the last go into `stream`, which is there only if
+    /// Answers a call of `peer`: with the last reply, or an error. Replies before the last go into `stream`, which is there only if
     /// the caller said `more`.
     ///
     /// It may wait as long as it likes, since only its own connection waits with it. It is dropped at any await when the
     /// server shuts down or the client cannot be written to.
     fn call(
         &self,
+        peer: Peer,
         request: Request,
         stream: Option<&mut Stream<'_>>,
     ) -> impl Future<Output = Result<Reply, CallError>> + Send;
@@ -47,6 +53,10 @@ pub trait Service: Send + Sync + 'static {
 pub struct Limits {
     /// How many clients are served at a time.
     pub clients: usize,
+    /// How many of them may belong to one user: nobody can take all places.
+    pub clients_of_a_user: usize,
+    /// Calls a second of one client; more are answered as late as this demands. A burst of as many is served at once.
+    pub calls_per_s: u32,
     /// The longest call, in bytes. The longest one that means anything has a few hundred.
     pub call_bytes: usize,
     /// How long a client may take to end a call that it has begun.
@@ -60,7 +70,9 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            clients: 64,
+            clients: 96,
+            clients_of_a_user: 64,
+            calls_per_s: 1000,
             call_bytes: 64 * 1024,
             call_time: Duration::from_secs(10),
             reply_time: Duration::from_secs(5),
@@ -77,29 +89,28 @@ pub async fn serve<S: Service>(
     limits: Limits,
     shutdown: impl Future<Output = ()>,
 ) {
-    let mut connections = JoinSet::new();
+    let mut connections = Connections::default();
     let mut shutdown = std::pin::pin!(shutdown);
     let mut was_full = false;
     loop {
         tokio::select! {
             () = &mut shutdown => break,
-            Some(ended) = connections.join_next() => log_panic(ended),
-            accepted = listener.accept() => match accepted {
-                Ok((stream, _address)) => {
+            Some(ended) = connections.tasks.join_next_with_id() => connections.remove(ended),
+            accepted = listener.accept() => match accepted.and_then(|(stream, _address)| Ok((Peer::of(&stream)?, stream))) {
+                Ok((peer, stream)) => {
                     // Those that have hung up meanwhile do not count.
-                    while let Some(ended) = connections.try_join_next() {
-                        log_panic(ended);
+                    while let Some(ended) = connections.tasks.try_join_next_with_id() {
+                        connections.remove(ended);
                     }
-                    let full = connections.len() >= limits.clients;
-                    if full && !was_full {
+                    let full = connections.limit(peer, limits);
+                    if let Some(limit) = full && !was_full {
                         // Once, not for each: a client that tries again and again must not fill the log.
-                        tracing::warn!(clients = limits.clients, "too many clients, turning more away");
+                        tracing::warn!(uid = peer.uid, limit, "too many clients, turning more away");
                     }
-                    was_full = full;
-                    if full {
-                        turn_away(&stream, limits);
-                    } else {
-                        connections.spawn(connection::run(stream, Arc::clone(&service), limits));
+                    was_full = full.is_some();
+                    match full {
+                        Some(limit) => turn_away(&stream, limit),
+                        None => connections.add(peer, connection::run(stream, peer, Arc::clone(&service), limits)),
                     }
                 }
                 Err(error) => {
@@ -110,6 +121,7 @@ pub async fn serve<S: Service>(
             },
         }
     }
+    let mut connections = connections.tasks;
     let drained = async {
         while let Some(ended) = connections.join_next().await {
             log_panic(ended);
@@ -120,16 +132,46 @@ pub async fn serve<S: Service>(
     }
 }
 
+/// The clients that are served, and whose they are.
+#[derive(Debug, Default)]
+struct Connections {
+    tasks: JoinSet<()>,
+    owners: BTreeMap<Id, u32>,
+}
+
+impl Connections {
+    /// The limit that one more client of `peer`'s user would break.
+    fn limit(&self, peer: Peer, limits: Limits) -> Option<usize> {
+        let of_the_user = self.owners.values().filter(|uid| **uid == peer.uid).count();
+        if self.tasks.len() >= limits.clients {
+            Some(limits.clients)
+        } else {
+            (of_the_user >= limits.clients_of_a_user).then_some(limits.clients_of_a_user)
+        }
+    }
+
+    fn add(&mut self, peer: Peer, connection: impl Future<Output = ()> + Send + 'static) {
+        let task = self.tasks.spawn(connection);
+        self.owners.insert(task.id(), peer.uid);
+    }
+
+    fn remove(&mut self, ended: Result<(Id, ()), JoinError>) {
+        let id = ended.as_ref().map_or_else(JoinError::id, |(id, ())| *id);
+        self.owners.remove(&id);
+        log_panic(ended);
+    }
+}
+
 /// Tells a client that it is one too many, if that can be done at once.
-fn turn_away(stream: &UnixStream, limits: Limits) {
-    if let Ok(bytes) = encode(&Error::TooManyClients { limit: limits.clients as u64 })
+fn turn_away(stream: &UnixStream, limit: usize) {
+    if let Ok(bytes) = encode(&Error::TooManyClients { limit: limit as u64 })
         && let Err(error) = stream.try_write(&bytes)
     {
         tracing::debug!(%error, "could not tell a client that it is one too many");
     }
 }
 
-fn log_panic(ended: Result<(), tokio::task::JoinError>) {
+fn log_panic<Value>(ended: Result<Value, JoinError>) {
     if let Err(error) = ended
         && error.is_panic()
     {

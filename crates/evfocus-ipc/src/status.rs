@@ -146,10 +146,26 @@ pub struct Status {
     pub lens: Option<String>,
     /// What is wrong at the moment, in words, with what to do about it; nothing if all is well.
     pub fault: Option<String>,
+    /// What was asked of the operating system for real time, and whether it was granted; empty if nothing was.
+    #[serde(default)]
+    pub real_time: Vec<Grant>,
     /// The daemon's version.
     pub version: String,
     /// Seconds since the daemon started.
     pub uptime_s: f64,
+}
+
+/// Something that was asked of the operating system.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Grant {
+    /// What: `control scheduling`, `camera processors`, `memory`.
+    pub what: String,
+    /// What was asked for: `SCHED_FIFO 20`, `2 3`, `locked`.
+    pub asked: String,
+    /// Whether it was granted.
+    pub granted: bool,
+    /// Why it was not, and what to do about it.
+    pub remedy: Option<String>,
 }
 
 /// How the last run ended.

@@ -3,8 +3,8 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
-    abort, analyze, completions, demo, devices, eval, focus, info, measure, mode, move_lens, report,
-    simulate, status, watch,
+    abort, analyze, completions, demo, devices, doctor, eval, focus, info, man, measure, mode, move_lens,
+    reload, report, simulate, status, watch,
 };
 use crate::exit::Exit;
 
@@ -37,7 +37,9 @@ enum Command {
     Move(move_lens::Arguments),
     Mode(mode::Arguments),
     Devices(devices::Arguments),
+    Doctor(doctor::Arguments),
     Report(report::Arguments),
+    Reload(reload::Arguments),
     Analyze(analyze::Arguments),
     Info(info::Arguments),
     Simulate(simulate::Arguments),
@@ -45,6 +47,8 @@ enum Command {
     Eval(eval::Arguments),
     Measure(measure::Arguments),
     Completions(completions::Arguments),
+    #[command(hide = true)]
+    Man(man::Arguments),
 }
 
 impl Cli {
@@ -58,7 +62,9 @@ impl Cli {
             Command::Move(arguments) => move_lens::run(&arguments),
             Command::Mode(arguments) => mode::run(&arguments),
             Command::Devices(arguments) => devices::run(&arguments),
+            Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
+            Command::Reload(arguments) => reload::run(&arguments),
             Command::Analyze(arguments) => analyze::run(&arguments),
             Command::Info(arguments) => info::run(&arguments),
             Command::Simulate(arguments) => simulate::run(&arguments),
@@ -66,6 +72,7 @@ impl Cli {
             Command::Eval(arguments) => eval::run(&arguments),
             Command::Measure(arguments) => measure::run(&arguments),
             Command::Completions(arguments) => completions::run(&arguments, &mut Self::command()),
+            Command::Man(arguments) => man::run(&arguments, Self::command()),
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::config::{Config, ConfigError};
 ///
 /// Without a configuration it drives a simulated rig. It listens on a Varlink socket (interface org.evfocus.Controller), which
 /// `evfocus` and other programs use.
-#[derive(Debug, Parser)]
+#[derive(Debug, Clone, Parser)]
 #[command(name = "evfocusd", version, subcommand_negates_reqs = true, args_conflicts_with_subcommands = true)]
 pub struct Arguments {
     /// What to do instead of running.
@@ -28,7 +28,7 @@ pub struct Arguments {
 }
 
 /// What to do instead of running.
-#[derive(Debug, Subcommand)]
+#[derive(Debug, Clone, Subcommand)]
 pub enum Command {
     /// Check a configuration file and say what is wrong with it
     CheckConfig {

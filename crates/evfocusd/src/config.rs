@@ -1,8 +1,11 @@
 //! The configuration file: what users write, and what it means once it has been checked.
 
+mod access;
 mod camera;
 mod focus;
 mod lens;
+mod metrics;
+mod real_time;
 mod simulation;
 mod value;
 
@@ -13,12 +16,17 @@ use evfocus_core::LensPosition;
 use evfocus_core::controller::{FocusRequest, Mode, Refusal};
 use serde::Deserialize;
 
+use crate::reports::Kept;
+
+pub use access::AccessSection;
 pub use camera::{Bias, CameraConfig, CameraSection};
 pub use focus::FocusSection;
 pub use lens::{
     DriveSection, FirmataSection, GrblSection, IndiSection, LabJackSection, LensBackend, LensDriver,
     LensPlace, LensSection, MoonLiteSection, OptotuneSection, SettingSection,
 };
+pub use metrics::MetricsSection;
+pub use real_time::RealTimeSection;
 pub use simulation::{FaultSection, SimulationSection};
 pub(crate) use value::BadValue;
 
@@ -28,6 +36,12 @@ pub(crate) use value::BadValue;
 pub struct ConfigFile {
     /// The daemon itself.
     pub daemon: DaemonSection,
+    /// Who may move the lens.
+    pub access: AccessSection,
+    /// What is asked of the operating system.
+    pub real_time: RealTimeSection,
+    /// Figures for Prometheus.
+    pub metrics: MetricsSection,
     /// The camera.
     pub camera: CameraSection,
     /// The lens.
@@ -48,13 +62,15 @@ pub struct DaemonSection {
     pub state_dir: Option<PathBuf>,
     /// How many reports to keep; the oldest go first. 1 to 1,000,000.
     pub reports_kept: u32,
+    /// After how many days reports are deleted, however few there are; 1 to 36,500; absent: never.
+    pub report_days: Option<u32>,
     /// `auto`: focus runs when triggered; `manual`: the caller moves the lens.
     pub mode: String,
 }
 
 impl Default for DaemonSection {
     fn default() -> Self {
-        Self { socket: None, state_dir: None, reports_kept: 1000, mode: "auto".to_owned() }
+        Self { socket: None, state_dir: None, reports_kept: 1000, report_days: None, mode: "auto".to_owned() }
     }
 }
 
@@ -69,6 +85,14 @@ pub struct Config {
     pub reports_kept: usize,
     /// The mode to start in.
     pub mode: Mode,
+    /// After how many days reports are deleted.
+    pub report_days: Option<u32>,
+    /// Who may move the lens.
+    pub access: AccessSection,
+    /// What is asked of the operating system.
+    pub real_time: RealTimeSection,
+    /// Figures for Prometheus.
+    pub metrics: MetricsSection,
     /// Which lens, and where.
     pub lens: LensBackend,
     /// How often the lens is asked where it is.
@@ -165,6 +189,9 @@ impl Config {
         };
         let reports = f64::from(file.daemon.reports_kept);
         BadValue::check("daemon.reports_kept", reports, 1.0, 1e6)?;
+        if let Some(days) = file.daemon.report_days {
+            BadValue::check("daemon.report_days", f64::from(days), 1.0, 36_500.0)?;
+        }
         let lens = file.lens.backend()?;
         for (key, path) in
             [("daemon.socket", &file.daemon.socket), ("daemon.state_dir", &file.daemon.state_dir)]
@@ -178,6 +205,10 @@ impl Config {
             state_dir: file.daemon.state_dir.unwrap_or_else(default_state_dir),
             reports_kept: file.daemon.reports_kept as usize,
             mode,
+            report_days: file.daemon.report_days,
+            access: file.access,
+            real_time: file.real_time.check()?,
+            metrics: file.metrics.check()?,
             lens_poll: BadValue::duration("lens.poll_ms", file.lens.poll_ms, 1e-3, 0.5, 1000.0)?,
             lens_backlash: BadValue::check("lens.backlash_counts", file.lens.backlash_counts, 0.0, 1e6)?,
             camera: file.camera.camera()?,
@@ -199,6 +230,12 @@ impl Config {
             })?;
         }
         Ok(config)
+    }
+
+    /// Which reports stay.
+    pub(crate) fn kept(&self) -> Kept {
+        let age = self.report_days.map(|days| Duration::from_secs(u64::from(days) * 24 * 3600));
+        Kept { newest: self.reports_kept, age }
     }
 
     /// The controller's settings for `lens`.

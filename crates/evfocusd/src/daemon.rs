@@ -13,20 +13,27 @@ use evfocus_ipc::server::Limits;
 use evfocus_ipc::{self as ipc, Device, Error, Report, Status};
 use rtrb::RingBuffer;
 use tokio::sync::{broadcast, mpsc, watch};
+use tokio::task::JoinSet;
 
+use crate::access::Access;
 use crate::config::{CameraConfig, Config};
 use crate::device_list::DeviceList;
 use crate::devices::{self, Devices};
-use crate::handle::{Handle, Lookups};
-use crate::publisher::{Constants, PROGRESS, Publisher, Reports};
-use crate::reports::ReportStore;
+use crate::handle::{Handle, Lookups, Reloaded};
+use crate::metrics::{self, Metrics};
+use crate::publisher::{Constants, PROGRESS, Publisher};
+use crate::real_time::{Grants, Wish};
+use crate::reload::{self, Reloader, Reread};
+use crate::reports::{ReportStore, Reports};
 use crate::rig_delay::RigDelayFile;
 use crate::service;
+use crate::supervisor::{self, Supervisor};
 use crate::threads::camera::{BATCH_EVENTS, BATCHES, CameraThread};
 use crate::threads::control::{CURVE_POINTS, ControlThread, Publications, REPORTS};
 use crate::threads::lens::{LensThread, SAMPLES};
 use crate::threads::orders::orders;
 use crate::threads::{NOTICES, StopFlag};
+use crate::vitals::Vitals;
 
 /// Commands from clients that may wait for the control thread, which looks every 2 ms.
 const COMMANDS: usize = 64;
@@ -36,7 +43,7 @@ const START_TIME: Duration = Duration::from_secs(2);
 const STOP_TIME: Duration = Duration::from_secs(5);
 
 /// Runs the daemon of `config` until `shutdown` completes; `ready` is called once the socket takes connections and the lens has
-/// answered.
+/// answered. `reread` is asked for the configuration again when a client or SIGHUP says so.
 ///
 /// Needs a current-thread tokio runtime with time and input/output.
 ///
@@ -44,11 +51,16 @@ const STOP_TIME: Duration = Duration::from_secs(5);
 /// What keeps the daemon from starting, with the remedy; or that one of its threads has died.
 pub async fn run(
     config: Config,
+    reread: Reread,
     ready: impl FnOnce(),
     shutdown: impl Future<Output = ()>,
 ) -> anyhow::Result<()> {
-    let socket = ipc::server::Socket::bind(&config.socket)
-        .with_context(|| format!("cannot listen on {}", config.socket.display()))?;
+    let socket =
+        match supervisor::inherited_socket().context("the socket handed over by the service manager")? {
+            Some(listener) => ipc::server::Socket::inherited(listener)?,
+            None => ipc::server::Socket::bind(&config.socket)
+                .with_context(|| format!("cannot listen on {}", config.socket.display()))?,
+        };
     let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
     let devices = Devices::open(&config, &clock)?;
     if config.camera == CameraConfig::Simulated && config.rig.sensor.geometry.pixels() > 200_000 {
@@ -59,11 +71,15 @@ pub async fn run(
     if config.lens.is_hardware() {
         tracing::warn!("the simulated camera does not look through this lens; it serves to try the lens");
     }
-    let mut running = Running::start(&config, devices, &clock)?;
+    let mut running = Running::start(&config, reread, devices, &clock)?;
     let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());
     running.wait_for_the_lens().await;
     tracing::info!(socket = %config.socket.display(), state_dir = %config.state_dir.display(), "ready");
     ready();
+    supervisor::ready();
+    let supervision = tokio::spawn(running.supervisor().run());
+    let scrapers = running.serve_metrics(&config)?;
+    let hangups = tokio::spawn(reload::on_hangup(Arc::clone(&running.handle.lookups)));
     let handle = running.handle.clone();
     let threads_alive = running.ended.recv();
     let mut died = false;
@@ -74,6 +90,10 @@ pub async fn run(
         }
     };
     service::serve(socket, handle, Limits::default(), until).await;
+    supervisor::stopping();
+    supervision.abort();
+    hangups.abort();
+    drop(scrapers);
     running.stop().await?;
     // The control thread is gone, so the publisher ends once it has written the last report.
     tokio::time::timeout(STOP_TIME, publisher).await.context("the last report was not written in time")??;
@@ -89,18 +109,26 @@ struct Running {
     handle: Handle,
     publisher: Option<Publisher>,
     stop: StopFlag,
+    vitals: Vitals,
+    metrics: Metrics,
     threads: Vec<(&'static str, JoinHandle<()>)>,
     /// A thread that ends says so here.
     ended: mpsc::Receiver<()>,
 }
 
 impl Running {
-    fn start(config: &Config, devices: Devices, clock: &Arc<dyn Clock>) -> anyhow::Result<Self> {
+    fn start(
+        config: &Config,
+        reread: Reread,
+        devices: Devices,
+        clock: &Arc<dyn Clock>,
+    ) -> anyhow::Result<Self> {
+        let access = Arc::new(Access::of(&config.access)?);
         let (camera_info, lens_info) = (devices.camera.info(), devices.lens.info());
         let mut settings = config
             .controller(&lens_info)
             .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
-        let store = Reports::new(ReportStore::open(&config.state_dir, config.reports_kept));
+        let store = Reports::new(ReportStore::open(&config.state_dir, config.kept()));
         if let Some(fault) = store.fault() {
             tracing::error!(%fault, "reports are kept in memory only");
         }
@@ -131,7 +159,16 @@ impl Running {
         let (status_in, status_out) = watch::channel(Arc::new(Status::default()));
         let (progress_in, _) = broadcast::channel(PROGRESS);
 
-        let stop = StopFlag::default();
+        let grants = Grants::default();
+        if config.real_time.lock_memory {
+            grants.lock_memory();
+        }
+        let asked = config.real_time.clone();
+        let control_wish = Wish { priority: asked.control_priority, cpus: asked.control_cpus };
+        let camera_wish = Wish { priority: asked.camera_priority, cpus: asked.camera_cpus };
+        let (access_in, access_out) = watch::channel(access);
+
+        let (stop, vitals) = (StopFlag::default(), Vitals::default());
         let (ended_in, ended) = mpsc::channel(3);
         let control = ControlThread {
             controller,
@@ -144,10 +181,18 @@ impl Running {
             notices: [camera_notices_out, lens_notices_out],
             commands: commands_out,
             orders: orders_in,
+            new_settings: None,
+            vitals: vitals.clone(),
             publications: Publications { snapshots: snapshots_in, curve: curve_in, reports: reports_in },
             stop: stop.clone(),
         };
-        let control = spawn("evfocus-control", &ended_in, move || control.run())?;
+        let control = spawn("evfocus-control", &ended_in, {
+            let (grants, wish) = (grants.clone(), control_wish);
+            move || {
+                grants.ask("control", &wish);
+                control.run();
+            }
+        })?;
         let camera = CameraThread {
             camera: devices.camera,
             clock: Arc::clone(clock),
@@ -165,16 +210,33 @@ impl Running {
             samples: samples_in,
             notices: lens_notices_in,
             control: control.thread().clone(),
+            vitals: vitals.clone(),
         };
-        let camera = spawn("evfocus-camera", &ended_in, move || camera.run())?;
+        let camera = spawn("evfocus-camera", &ended_in, {
+            let (grants, wish) = (grants.clone(), camera_wish);
+            move || {
+                grants.ask("camera", &wish);
+                camera.run();
+            }
+        })?;
         let lens = spawn("evfocus-lens", &ended_in, move || lens.run())?;
 
+        let reloader = Reloader {
+            reread,
+            current: std::sync::Mutex::new(config.clone()),
+            lens: lens_info.clone(),
+            commands: commands_in.clone(),
+            access: access_in,
+            reports: store.clone(),
+        };
         let lookups = DaemonLookups {
+            reloader,
             devices: DeviceList::new(config, camera_info, lens_info),
             reports: store.clone(),
             status: status_out.clone(),
         };
         let followers = progress_in.downgrade();
+        let metrics = Metrics::new(vitals.clone());
         let publisher = Publisher {
             snapshots: snapshots_out,
             curve: curve_out,
@@ -183,6 +245,8 @@ impl Running {
             progress: progress_in,
             store,
             rig_delay,
+            metrics: metrics.clone(),
+            grants,
             saved_delays,
             constants: Constants { devices: run_devices, limits },
             clock: Arc::clone(clock),
@@ -192,13 +256,34 @@ impl Running {
                 commands: commands_in,
                 status: status_out,
                 progress: followers,
+                access: access_out,
                 lookups: Arc::new(lookups),
             },
             publisher: Some(publisher),
             stop,
+            vitals,
+            metrics,
             threads: vec![("evfocus-control", control), ("evfocus-lens", lens), ("evfocus-camera", camera)],
             ended,
         })
+    }
+
+    fn supervisor(&self) -> Supervisor {
+        Supervisor { status: self.handle.status.clone(), vitals: self.vitals.clone() }
+    }
+
+    /// Starts what hands the figures out; it ends with what is returned.
+    fn serve_metrics(&self, config: &Config) -> anyhow::Result<JoinSet<()>> {
+        let mut tasks = JoinSet::new();
+        if let Some(path) = &config.metrics.socket {
+            let socket = ipc::server::Socket::bind(path)
+                .with_context(|| format!("cannot serve metrics on {}", path.display()))?;
+            tasks.spawn(metrics::answer(socket, self.metrics.clone()));
+        }
+        if let Some(path) = &config.metrics.file {
+            tasks.spawn(metrics::keep_file(path.clone(), self.metrics.clone()));
+        }
+        Ok(tasks)
     }
 
     /// Returns when the first word of the lens has been published, so that whoever is told "ready" can focus at once; or after a
@@ -269,6 +354,7 @@ fn spawn(
 
 /// What clients may look up without the control thread.
 struct DaemonLookups {
+    reloader: Reloader,
     devices: DeviceList,
     reports: Reports,
     status: watch::Receiver<Arc<Status>>,
@@ -282,5 +368,9 @@ impl Lookups for DaemonLookups {
 
     fn report(&self, id: Option<u64>) -> Result<Report, Error> {
         self.reports.read(id)
+    }
+
+    fn reload(&self) -> Result<Reloaded, Error> {
+        self.reloader.reload()
     }
 }

@@ -5,8 +5,12 @@
 
 use std::sync::Arc;
 
+use evfocus_core::ControllerConfig;
+pub use evfocus_ipc::client::Reloaded;
 use evfocus_ipc::{Device, Error, FocusRequest, Mode, Progress, Report, Status};
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
+
+use crate::access::Access;
 
 /// The answer to a command.
 pub type Answer<Value> = oneshot::Sender<Result<Value, Error>>;
@@ -40,15 +44,23 @@ pub enum Command {
         /// Done.
         answer: Answer<()>,
     },
+    /// Change the settings; they hold once no run is under way.
+    Configure {
+        /// The new settings.
+        settings: Box<ControllerConfig>,
+    },
 }
 
-/// What is looked up without the control thread. These may take their time: they run on a thread of their own.
+/// What is looked up, or done, away from the task that serves clients. These may take their time: they run on a thread of their own.
 pub trait Lookups: Send + Sync + 'static {
     /// The devices in use, attached or configured.
     fn devices(&self) -> Result<Vec<Device>, Error>;
 
     /// The report of run `id`, or of the last one that has one.
     fn report(&self, id: Option<u64>) -> Result<Report, Error>;
+
+    /// Reads the configuration anew and applies what can be changed while running.
+    fn reload(&self) -> Result<Reloaded, Error>;
 }
 
 /// The daemon as the socket sees it. Clones share the same channels.
@@ -62,7 +74,9 @@ pub struct Handle {
     /// behind by the channel's capacity loses the oldest, and is told how many. Weak, so that followers notice when the
     /// control thread has gone and its sender with it.
     pub progress: broadcast::WeakSender<Arc<Progress>>,
-    /// Devices and reports.
+    /// Who may move the lens.
+    pub access: watch::Receiver<Arc<Access>>,
+    /// Devices, reports and the configuration.
     pub lookups: Arc<dyn Lookups>,
 }
 

@@ -2,22 +2,29 @@
 //!
 //! Not its job: deciding anything about focus (evfocus-core), speaking a device's protocol (the driver crates), or judging results.
 
+pub mod access;
 pub mod arguments;
 pub mod config;
 pub mod daemon;
 mod device_list;
 pub mod devices;
+pub mod doctor;
 pub mod handle;
 pub mod logging;
+mod metrics;
 pub mod parts_report;
 mod publisher;
+mod real_time;
+pub mod reload;
 mod reports;
 mod rig_delay;
 pub mod service;
 mod storage;
+pub mod supervisor;
 pub mod sweep_report;
 mod threads;
 pub mod virtual_rig;
+mod vitals;
 pub mod windows;
 mod wire;
 

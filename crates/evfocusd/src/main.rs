@@ -4,9 +4,13 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::Parser;
+use evfocusd::access::UnknownName;
 use evfocusd::arguments::{Arguments, Command};
-use evfocusd::{Config, daemon, logging};
+use evfocusd::{Config, ConfigError, daemon, logging};
 use tokio::signal::unix::{SignalKind, signal};
+
+/// `EX_CONFIG` of sysexits.h: the service manager need not try again.
+const BAD_CONFIGURATION: u8 = 78;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -17,7 +21,11 @@ fn main() -> ExitCode {
             {
                 eprintln!("evfocusd: {error:#}");
             }
-            ExitCode::FAILURE
+            if error.is::<ConfigError>() || error.is::<UnknownName>() {
+                ExitCode::from(BAD_CONFIGURATION)
+            } else {
+                ExitCode::FAILURE
+            }
         }
     }
 }
@@ -44,7 +52,8 @@ fn start(arguments: &Arguments) -> anyhow::Result<()> {
                 _ = interrupt.recv() => tracing::info!(signal = "SIGINT", "stopping"),
             }
         };
-        daemon::run(config, || {}, shutdown).await
+        let arguments = arguments.clone();
+        daemon::run(config, Box::new(move || arguments.configuration()), || {}, shutdown).await
     });
     // A device call that hangs must not keep the process: it has been named in the error.
     runtime.shutdown_background();

@@ -10,7 +10,9 @@ use evfocus_ipc::{self as ipc, Progress, Report, Status};
 use rtrb::Consumer;
 use tokio::sync::{broadcast, mpsc, watch};
 
-use crate::reports::ReportStore;
+use crate::metrics::Metrics;
+use crate::real_time::Grants;
+use crate::reports::Reports;
 use crate::rig_delay::RigDelayFile;
 use crate::threads::control::EndedRun;
 use crate::wire;
@@ -47,6 +49,10 @@ pub(crate) struct Publisher {
     pub(crate) saved_delays: DelayModel,
     /// What stays the same.
     pub(crate) constants: Constants,
+    /// Figures of all this.
+    pub(crate) metrics: Metrics,
+    /// What was asked of the operating system.
+    pub(crate) grants: Grants,
     /// Host time.
     pub(crate) clock: Arc<dyn Clock>,
 }
@@ -61,56 +67,6 @@ impl std::fmt::Debug for Publisher {
 struct News {
     fault: Option<String>,
     last_run: Option<ipc::LastRun>,
-}
-
-/// The reports on disk, and the newest one in memory: a full disk must not swallow it.
-#[derive(Debug, Clone)]
-pub(crate) struct Reports {
-    store: Result<ReportStore, ipc::Error>,
-    newest: watch::Sender<Option<Arc<Report>>>,
-}
-
-impl Reports {
-    /// Reports in `store`, or in memory only if that could not be opened.
-    pub(crate) fn new(store: Result<ReportStore, ipc::Error>) -> Self {
-        Self { store, newest: watch::Sender::new(None) }
-    }
-
-    /// What is wrong with the store.
-    pub(crate) fn fault(&self) -> Option<String> {
-        self.store.as_ref().err().map(ToString::to_string)
-    }
-
-    /// The number of the newest report on disk.
-    pub(crate) fn newest_on_disk(&self) -> Option<u64> {
-        self.store.as_ref().ok()?.newest()
-    }
-
-    fn write(&self, report: &Arc<Report>) -> Result<(), ipc::Error> {
-        self.newest.send_replace(Some(Arc::clone(report)));
-        match &self.store {
-            Ok(store) => {
-                store.write(report).map(|path| tracing::debug!(path = %path.display(), "report written"))
-            }
-            Err(error) => Err(error.clone()),
-        }
-    }
-
-    /// The report of run `id`, or of the last one.
-    ///
-    /// # Errors
-    /// [`ipc::Error::NoSuchReport`] or [`ipc::Error::StorageFailed`].
-    pub(crate) fn read(&self, id: Option<u64>) -> Result<Report, ipc::Error> {
-        if let Some(newest) = self.newest.borrow().as_ref()
-            && id.is_none_or(|id| id == newest.run_id)
-        {
-            return Ok(Report::clone(newest));
-        }
-        match &self.store {
-            Ok(store) => store.read(id),
-            Err(_) => Err(ipc::Error::NoSuchReport { id }),
-        }
-    }
 }
 
 impl Publisher {
@@ -138,6 +94,7 @@ impl Publisher {
 
     fn publish_snapshot(&mut self, news: &News) {
         let snapshot = *self.snapshots.borrow_and_update();
+        self.metrics.observe(&snapshot);
         let curve_points = self.send_curve(&snapshot);
         if let Some(run) = snapshot.run
             && !curve_points
@@ -158,6 +115,7 @@ impl Publisher {
         };
         let report = Arc::new(wire::report(ended, circumstances));
         log(&report);
+        self.metrics.count(&report);
         let fault = keep(self.store.clone(), Arc::clone(&report)).await;
         let delay_fault = self.keep_delays(ended.delays).await;
         news.fault = fault.or(delay_fault);
@@ -227,6 +185,7 @@ impl Publisher {
             camera: device(snapshot.camera_ready, &self.constants.devices.camera),
             lens: device(snapshot.lens_ready, &self.constants.devices.lens),
             fault: missing.or_else(|| news.fault.clone()),
+            real_time: self.grants.list(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: Duration::from_micros(u64::try_from(self.clock.now().0).unwrap_or(0)).as_secs_f64(),
         }

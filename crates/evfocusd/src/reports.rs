@@ -3,30 +3,41 @@
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use evfocus_ipc::{Error, Report};
+use tokio::sync::watch;
 
 use crate::storage::{failed, write_json};
 
 const PREFIX: &str = "run-";
 const SUFFIX: &str = ".json";
 
+/// Which reports stay; the newest always does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Kept {
+    /// So many.
+    pub(crate) newest: usize,
+    /// Those younger than this.
+    pub(crate) age: Option<Duration>,
+}
+
 /// Where reports are kept.
 #[derive(Debug, Clone)]
 pub(crate) struct ReportStore {
     directory: PathBuf,
-    kept: usize,
+    kept: Arc<Mutex<Kept>>,
     /// Held while the store lives, so that no other daemon numbers its runs in the same directory.
     _lock: Arc<File>,
 }
 
 impl ReportStore {
-    /// The store in `state_dir`, which is made if it is not there. Of the reports, the newest `kept` stay.
+    /// The store in `state_dir`, which is made if it is not there. Of the reports, those stay that `kept` says.
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the directory and the remedy.
-    pub(crate) fn open(state_dir: &Path, kept: usize) -> Result<Self, Error> {
+    pub(crate) fn open(state_dir: &Path, kept: Kept) -> Result<Self, Error> {
         let directory = state_dir.join("reports");
         fs::create_dir_all(&directory).map_err(|error| failed(&directory, &error))?;
         let lock = File::open(&directory).map_err(|error| failed(&directory, &error))?;
@@ -37,7 +48,7 @@ impl ReportStore {
                     .to_owned(),
             }
         })?;
-        Ok(Self { directory, kept: kept.max(1), _lock: Arc::new(lock) })
+        Ok(Self { directory, kept: Arc::new(Mutex::new(kept)), _lock: Arc::new(lock) })
     }
 
     fn path(&self, id: u64) -> PathBuf {
@@ -92,13 +103,85 @@ impl ReportStore {
     }
 
     fn drop_oldest(&self) {
+        let kept = *self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let mut numbers = self.numbers();
         numbers.sort_unstable();
-        let surplus = numbers.len().saturating_sub(self.kept);
-        for &number in numbers.iter().take(surplus) {
-            if let Err(error) = fs::remove_file(self.path(number)) {
+        // The newest is not among them.
+        numbers.pop();
+        let surplus = (numbers.len() + 1).saturating_sub(kept.newest);
+        for (index, &number) in numbers.iter().enumerate() {
+            if (index < surplus || self.is_older(number, kept.age))
+                && let Err(error) = fs::remove_file(self.path(number))
+            {
                 tracing::warn!(run = number, %error, "an old report cannot be deleted");
             }
+        }
+    }
+
+    /// A file whose age cannot be told is not old: the clock may have been set back.
+    fn is_older(&self, number: u64, age: Option<Duration>) -> bool {
+        let written = || fs::metadata(self.path(number)).ok()?.modified().ok()?.elapsed().ok();
+        age.is_some_and(|age| written().is_some_and(|elapsed| elapsed > age))
+    }
+}
+
+/// The reports on disk, and the newest one in memory: a full disk must not swallow it.
+#[derive(Debug, Clone)]
+pub(crate) struct Reports {
+    store: Result<ReportStore, Error>,
+    newest: watch::Sender<Option<Arc<Report>>>,
+}
+
+impl Reports {
+    /// Reports in `store`, or in memory only if that could not be opened.
+    pub(crate) fn new(store: Result<ReportStore, Error>) -> Self {
+        Self { store, newest: watch::Sender::new(None) }
+    }
+
+    /// From the next report on, those stay that `kept` says.
+    pub(crate) fn keep(&self, kept: Kept) {
+        if let Ok(store) = &self.store {
+            *store.kept.lock().unwrap_or_else(PoisonError::into_inner) = kept;
+        }
+    }
+
+    /// What is wrong with the store.
+    pub(crate) fn fault(&self) -> Option<String> {
+        self.store.as_ref().err().map(ToString::to_string)
+    }
+
+    /// The number of the newest report on disk.
+    pub(crate) fn newest_on_disk(&self) -> Option<u64> {
+        self.store.as_ref().ok()?.newest()
+    }
+
+    /// Keeps `report`, in memory at least.
+    ///
+    /// # Errors
+    /// [`Error::StorageFailed`].
+    pub(crate) fn write(&self, report: &Arc<Report>) -> Result<(), Error> {
+        self.newest.send_replace(Some(Arc::clone(report)));
+        match &self.store {
+            Ok(store) => {
+                store.write(report).map(|path| tracing::debug!(path = %path.display(), "report written"))
+            }
+            Err(error) => Err(error.clone()),
+        }
+    }
+
+    /// The report of run `id`, or of the last one.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchReport`] or [`Error::StorageFailed`].
+    pub(crate) fn read(&self, id: Option<u64>) -> Result<Report, Error> {
+        if let Some(newest) = self.newest.borrow().as_ref()
+            && id.is_none_or(|id| id == newest.run_id)
+        {
+            return Ok(Report::clone(newest));
+        }
+        match &self.store {
+            Ok(store) => store.read(id),
+            Err(_) => Err(Error::NoSuchReport { id }),
         }
     }
 }

@@ -7,12 +7,12 @@ use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_ipc::server::{self, CallError, Info, Limits, Service, Socket, Stream};
+use evfocus_ipc::server::{self, CallError, Info, Limits, Peer, Service, Socket, Stream};
 use evfocus_ipc::{Error, FocusRequest, ProtocolError, Reply, Request};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 
-use crate::handle::{Answer, Command, Handle};
+use crate::handle::{Answer, Command, Handle, Reloaded};
 
 /// How long the control thread has for an answer. It needs about a millisecond; a clock is the only one that can tell
 /// that it has stopped.
@@ -40,7 +40,15 @@ impl Service for Controller {
         }
     }
 
-    async fn call(&self, request: Request, stream: Option<&mut Stream<'_>>) -> Result<Reply, CallError> {
+    async fn call(
+        &self,
+        peer: Peer,
+        request: Request,
+        stream: Option<&mut Stream<'_>>,
+    ) -> Result<Reply, CallError> {
+        if request.controls() {
+            self.handle.access.borrow().check(peer, request.name())?;
+        }
         match request {
             Request::GetStatus => Ok(Reply::Status { status: Arc::clone(&self.handle.status.borrow()) }),
             Request::Focus(request) => self.focus(request, stream).await,
@@ -68,6 +76,11 @@ impl Service for Controller {
             Request::ListDevices => {
                 let lookups = Arc::clone(&self.handle.lookups);
                 Ok(Reply::Devices { devices: aside(move || lookups.devices()).await? })
+            }
+            Request::Reload => {
+                let lookups = Arc::clone(&self.handle.lookups);
+                let Reloaded { applied, needs_restart } = aside(move || lookups.reload()).await?;
+                Ok(Reply::Reloaded { applied, needs_restart })
             }
         }
     }

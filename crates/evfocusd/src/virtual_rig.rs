@@ -9,12 +9,14 @@ use evfocus_core::{Controller, CurvePoint, EventBatch, HostMicros, LensPosition,
 use evfocus_hal::{Camera, Clock, DeviceError, Lens, VirtualClock};
 
 use crate::config::Config;
-use crate::devices;
+use crate::devices::{self, Devices};
 
 /// Virtual time from one look at the camera to the next: the period of the simulated link's transfers.
 const STEP: Duration = Duration::from_millis(1);
 /// Virtual time without news after which the devices are given up before a run.
 const START_UP: Duration = Duration::from_secs(1);
+/// How often a device that failed is tried again.
+const RETRY: Duration = Duration::from_secs(1);
 /// Events a batch holds: 1 ms at 65 million events a second.
 const BATCH_EVENTS: usize = 65_536;
 
@@ -46,8 +48,9 @@ pub struct VirtualRig {
     actions: Vec<Action>,
     lens_poll: Duration,
     next_poll: HostMicros,
-    camera_failed: bool,
-    lens_failed: bool,
+    /// When a device that failed is tried again.
+    camera_failed: Option<HostMicros>,
+    lens_failed: Option<HostMicros>,
 }
 
 impl std::fmt::Debug for VirtualRig {
@@ -73,11 +76,23 @@ impl VirtualRig {
         config: &Config,
         open: impl FnOnce(&hil_sim::Rig, Arc<dyn Clock>) -> Result<Box<dyn Camera>, DeviceError>,
     ) -> Result<Self, VirtualRigError> {
+        Self::with_devices(config, |rig, clock| {
+            let camera = open(rig, Arc::clone(&clock))?;
+            Ok(Devices { camera, lens: devices::open_lens(&config.lens, rig, &clock)? })
+        })
+    }
+
+    /// The rig of `config` with the devices that `open` makes of it.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_devices(
+        config: &Config,
+        open: impl FnOnce(&hil_sim::Rig, Arc<dyn Clock>) -> Result<Devices, DeviceError>,
+    ) -> Result<Self, VirtualRigError> {
         let clock = Arc::new(VirtualClock::new());
         let rig = hil_sim::Rig::new(config.rig.clone(), clock.clone())?;
-        let mut camera = open(&rig, clock.clone())?;
-        let shared: Arc<dyn Clock> = clock.clone();
-        let lens = devices::open_lens(&config.lens, &rig, &shared)?;
+        let Devices { mut camera, lens } = open(&rig, clock.clone())?;
         camera.start()?;
         let settings =
             config.controller(&lens.info()).map_err(|bad| VirtualRigError::Settings(bad.to_string()))?;
@@ -91,8 +106,8 @@ impl VirtualRig {
             actions: Vec::with_capacity(16),
             lens_poll: config.lens_poll,
             next_poll: HostMicros(0),
-            camera_failed: false,
-            lens_failed: false,
+            camera_failed: None,
+            lens_failed: None,
         };
         // The daemon's clocks have long been related when somebody asks for focus.
         virtual_rig.run_for(START_UP);
@@ -144,9 +159,16 @@ impl VirtualRig {
     }
 
     fn read_camera(&mut self, now: HostMicros) {
-        while !self.camera_failed {
+        if self.camera_failed.is_some_and(|again| now >= again) {
+            self.camera_failed = Some(now + RETRY);
+            if self.camera.start().is_ok() {
+                self.camera_failed = None;
+                self.controller.handle(Input::CameraReady, now, &mut self.actions);
+            }
+        }
+        while self.camera_failed.is_none() {
             if let Err(error) = self.camera.read(&mut self.batch, Duration::ZERO) {
-                self.camera_failed = true;
+                self.camera_failed = Some(now + RETRY);
                 let input = Input::CameraFailed(devices::failure(&error));
                 self.controller.handle(input, now, &mut self.actions);
                 return;
@@ -159,17 +181,33 @@ impl VirtualRig {
     }
 
     fn sample_lens(&mut self) {
-        if self.lens_failed {
+        let now = self.clock.now();
+        if self.lens_failed.is_some_and(|again| now < again) {
             return;
         }
-        match self.lens.sample() {
+        let mut answer = self.lens.sample();
+        if self.lens_failed.is_some() && answer.is_ok() {
+            // As the daemon does: whatever it did while it did not answer, it stands still before anybody counts on it again.
+            if let Err(error) = self.lens.stop() {
+                answer = Err(error);
+            }
+        }
+        if self.lens_failed.is_some() && answer.is_ok() {
+            self.lens_failed = None;
+            self.controller.handle(Input::LensReady, now, &mut self.actions);
+        }
+        match answer {
             Ok(sample) => self.controller.handle(Input::Lens(sample), self.clock.now(), &mut self.actions),
             Err(error) => self.fail_lens(&error),
         }
     }
 
     fn fail_lens(&mut self, error: &DeviceError) {
-        self.lens_failed = true;
+        let news = self.lens_failed.is_none();
+        self.lens_failed = Some(self.clock.now() + RETRY);
+        if !news {
+            return;
+        }
         let input = Input::LensFailed(devices::failure(error));
         self.controller.handle(input, self.clock.now(), &mut self.actions);
     }
@@ -179,7 +217,8 @@ impl VirtualRig {
         let mut done = 0;
         while let Some(&action) = self.actions.get(done) {
             done += 1;
-            if self.lens_failed {
+            // A failed lens is still told to stop.
+            if self.lens_failed.is_some() && action != Action::StopLens {
                 continue;
             }
             if let Err(error) = devices::perform(action, self.lens.as_mut()) {

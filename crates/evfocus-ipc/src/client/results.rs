@@ -37,3 +37,12 @@ pub(super) struct OfDevices {
 /// Of the methods without results.
 #[derive(Debug, Deserialize)]
 pub(super) struct Nothing {}
+
+/// Of `Reload`: which settings have changed, by section or key.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Reloaded {
+    /// They hold from now on, or from the end of the run under way.
+    pub applied: Vec<String>,
+    /// They hold after a restart of the daemon.
+    pub needs_restart: Vec<String>,
+}

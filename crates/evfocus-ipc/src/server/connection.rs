@@ -9,8 +9,8 @@ use tokio::net::UnixStream;
 use tokio::net::unix::OwnedWriteHalf;
 use tokio::time::timeout;
 
-use super::varlink;
-use super::{Limits, Service};
+use super::rate::Rate;
+use super::{Limits, Peer, Service, varlink};
 use crate::frame::{FrameError, FrameReader, encode};
 use crate::message::{Call, Outgoing};
 use crate::{Error, INTERFACE, ProtocolError, Reply, Request};
@@ -67,22 +67,24 @@ impl Stream<'_> {
 }
 
 /// Serves one client.
-pub(super) async fn run<S: Service>(stream: UnixStream, service: Arc<S>, limits: Limits) {
+pub(super) async fn run<S: Service>(stream: UnixStream, peer: Peer, service: Arc<S>, limits: Limits) {
     let (reader, writer) = stream.into_split();
     let mut reader = FrameReader::new(reader, limits.call_bytes, Some(limits.call_time));
     let mut writer = Writer { socket: writer, limits, muted: false };
-    match serve(&mut reader, &mut writer, &*service).await {
+    match serve(&mut reader, &mut writer, peer, &*service).await {
         Ok(()) => tracing::trace!("a client has hung up"),
         Err(Closed(Reason::Write(error))) => tracing::debug!(%error, "a client has gone away"),
-        Err(reason) => tracing::warn!(%reason, "disconnecting a client"),
+        Err(reason) => tracing::warn!(uid = peer.uid, %reason, "disconnecting a client"),
     }
 }
 
 async fn serve<S: Service>(
     reader: &mut FrameReader<tokio::net::unix::OwnedReadHalf>,
     writer: &mut Writer,
+    peer: Peer,
     service: &S,
 ) -> Result<(), Closed> {
+    let mut rate = Rate::new(writer.limits.calls_per_s);
     while let Some(frame) = reader.next().await.map_err(Reason::from)? {
         let call: Call = serde_json::from_slice(frame).map_err(Reason::Garbage)?;
         // Varlink excludes the pair. A stream that writes nothing would never learn that its client has gone away.
@@ -90,7 +92,8 @@ async fn serve<S: Service>(
             return Err(Reason::ManyAndNone.into());
         }
         writer.muted = call.oneway;
-        match answer(call, writer, service).await {
+        rate.admit().await;
+        match answer(call, writer, peer, service).await {
             Ok(()) => {}
             Err(CallError::Refused(error)) => writer.send(&error).await?,
             Err(CallError::Protocol(error)) => writer.send(&error).await?,
@@ -103,7 +106,12 @@ async fn serve<S: Service>(
 }
 
 /// Answers one call up to its last reply.
-async fn answer<S: Service>(call: Call, writer: &mut Writer, service: &S) -> Result<(), CallError> {
+async fn answer<S: Service>(
+    call: Call,
+    writer: &mut Writer,
+    peer: Peer,
+    service: &S,
+) -> Result<(), CallError> {
     if call.upgrade {
         return Err(ProtocolError::InvalidParameter { parameter: "upgrade".to_owned() }.into());
     }
@@ -118,7 +126,7 @@ async fn answer<S: Service>(call: Call, writer: &mut Writer, service: &S) -> Res
             let request = Request::parse(method, parameters)
                 .ok_or_else(|| ProtocolError::MethodNotFound { method: call.method.clone() })??;
             let mut stream = Stream { writer };
-            let reply = service.call(request, call.more.then_some(&mut stream)).await?;
+            let reply = service.call(peer, request, call.more.then_some(&mut stream)).await?;
             Ok(writer.reply(&reply, false).await.map_err(Closed::from)?)
         }
         _ => Err(ProtocolError::InterfaceNotFound { interface: interface.to_owned() }.into()),

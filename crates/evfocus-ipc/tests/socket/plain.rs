@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use evfocus_ipc::client::Client;
-use evfocus_ipc::server::{self, CallError, Info, Limits, Service, Socket, Stream};
+use evfocus_ipc::server::{self, CallError, Info, Limits, Peer, Service, Socket, Stream};
 use evfocus_ipc::{Error, ProtocolError, Reply, Request, Status};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::UnixStream;
@@ -28,7 +28,12 @@ impl Service for Plain {
         Info { vendor: text("v"), product: text("p"), version: text("1"), url: text("https://example.org") }
     }
 
-    async fn call(&self, request: Request, stream: Option<&mut Stream<'_>>) -> Result<Reply, CallError> {
+    async fn call(
+        &self,
+        _: Peer,
+        request: Request,
+        stream: Option<&mut Stream<'_>>,
+    ) -> Result<Reply, CallError> {
         match (request, stream) {
             (Request::GetStatus, _) => Ok(Reply::Status { status: Arc::default() }),
             (Request::Monitor, Some(stream)) => {
@@ -46,9 +51,10 @@ impl Service for Plain {
             }
             // Never answered.
             (Request::Focus(_), _) => std::future::pending().await,
-            (Request::SetMode { .. } | Request::GetReport { .. } | Request::ListDevices, _) => {
-                Ok(Reply::Done {})
-            }
+            (
+                Request::SetMode { .. } | Request::GetReport { .. } | Request::ListDevices | Request::Reload,
+                _,
+            ) => Ok(Reply::Done {}),
         }
     }
 }

@@ -52,6 +52,10 @@ fn print(status: &Status, out: &mut Output) -> anyhow::Result<()> {
     if let Some(last) = &status.last_run {
         writeln!(out, "last run  {}", last_run(last))?;
     }
+    for grant in &status.real_time {
+        let refused = grant.remedy.as_ref().map(|remedy| format!(", not granted: {remedy}"));
+        writeln!(out, "real time {}: {}{}", grant.what, grant.asked, refused.unwrap_or_default())?;
+    }
     if let Some(fault) = &status.fault {
         writeln!(out, "fault     {fault}")?;
     }

@@ -25,12 +25,14 @@ impl Daemon {
             state_dir: folder.path().join("reports"),
             ..Config::simulated().unwrap()
         };
+        let again = config.clone();
+        let reread = Box::new(move || Ok(again.clone()));
         let (ready, is_ready) = std::sync::mpsc::channel();
         let (stop, stopped) = oneshot::channel::<()>();
         let thread = std::thread::spawn(move || {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
             let until = async { drop(stopped.await) };
-            runtime.block_on(daemon::run(config, move || ready.send(()).unwrap(), until)).unwrap();
+            runtime.block_on(daemon::run(config, reread, move || ready.send(()).unwrap(), until)).unwrap();
         });
         is_ready.recv().expect("the daemon starts");
         let daemon = Self { folder, stop: Some(stop), thread: Some(thread) };

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, Input, Pace, Snapshot};
 use evfocus_core::{
-    Controller, CurvePoint, DelayModel, EventBatch, Geometry, HostMicros, LensSample, RunId, RunReport,
+    Controller, ControllerConfig, CurvePoint, DelayModel, EventBatch, Geometry, HostMicros, LensSample,
+    RunId, RunReport,
 };
 use evfocus_hal::Clock;
 use evfocus_ipc as ipc;
@@ -15,6 +16,7 @@ use tokio::sync::{mpsc, watch};
 use super::orders::OrderSender;
 use super::{Notice, StopFlag};
 use crate::handle::Command;
+use crate::vitals::Vitals;
 use crate::wire;
 
 /// How long the thread sleeps unless somebody wakes it: commands wake nobody.
@@ -72,6 +74,10 @@ pub(crate) struct ControlThread {
     pub(crate) commands: mpsc::Receiver<Command>,
     /// Orders to the lens.
     pub(crate) orders: OrderSender,
+    /// Settings that wait for the end of the run under way.
+    pub(crate) new_settings: Option<Box<ControllerConfig>>,
+    /// Shows others that this thread makes progress, and how fast.
+    pub(crate) vitals: Vitals,
     /// To the socket's side.
     pub(crate) publications: Publications,
     /// When to end.
@@ -92,6 +98,7 @@ impl ControlThread {
         let mut curve_sent = (RunId(0), 0);
         while !self.stop.is_stopped() {
             std::thread::park_timeout(NAP);
+            self.vitals.waiting(self.filled.slots(), self.samples.slots());
             self.take_notices(&mut actions);
             self.take_samples(&mut actions);
             self.take_batches(&mut actions);
@@ -99,7 +106,9 @@ impl ControlThread {
             self.perform(&mut actions);
             self.take_commands(&mut actions);
             self.publish_curve(&mut curve_sent);
+            self.take_settings();
             self.publish(&mut published);
+            self.vitals.beat();
         }
         if self.controller.command(CoreCommand::Abort, self.clock.now(), &mut actions).is_ok() {
             self.perform(&mut actions);
@@ -129,6 +138,7 @@ impl ControlThread {
     fn take_batches(&mut self, actions: &mut Vec<Action>) {
         while let Ok(mut batch) = self.filled.pop() {
             self.controller.handle(Input::Batch(&batch), self.clock.now(), actions);
+            self.vitals.latency(self.clock.now().since(batch.arrival));
             batch.clear();
             // There is a place for every batch, so the way back is never full.
             if self.empty.push(batch).is_err() {
@@ -162,8 +172,18 @@ impl ControlThread {
                         self.controller.command(CoreCommand::SetMode(wire::core_mode(mode)), now, actions);
                     reply(answer, done.map(|_| ()).map_err(|refusal| wire::refusal(&refusal)));
                 }
+                Command::Configure { settings } => self.new_settings = Some(settings),
             }
             self.perform(actions);
+        }
+    }
+
+    /// New settings must not change a run under way.
+    fn take_settings(&mut self) {
+        if self.controller.snapshot().run.is_none()
+            && let Some(settings) = self.new_settings.take()
+        {
+            self.controller.reconfigure(*settings);
         }
     }
 

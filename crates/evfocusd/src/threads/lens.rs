@@ -12,6 +12,7 @@ use rtrb::Producer;
 use super::Notice;
 use super::orders::{OrderReceiver, Received};
 use crate::devices;
+use crate::vitals::Vitals;
 
 /// Samples in flight: half a second at 1 kHz.
 pub(crate) const SAMPLES: usize = 512;
@@ -19,6 +20,9 @@ pub(crate) const SAMPLES: usize = 512;
 const REST_POLL: Duration = Duration::from_millis(50);
 /// How long a lens is asked often after the last order or motion.
 const ATTENTION: Duration = Duration::from_millis(500);
+/// A control thread that has made no progress for this long does not know where the lens goes. Its longest step is the search at
+/// the end of a large sweep, with the lens at rest.
+const CONTROL_HANGS: Duration = Duration::from_secs(2);
 /// How often a lens that failed is tried again.
 const RETRY: Duration = Duration::from_secs(1);
 
@@ -38,6 +42,17 @@ pub(crate) struct LensThread {
     pub(crate) notices: Producer<Notice>,
     /// Who is woken when something leaves.
     pub(crate) control: Thread,
+    /// Whether that thread makes progress.
+    pub(crate) vitals: Vitals,
+}
+
+/// The last progress of the control thread that was seen, and when.
+#[derive(Debug, Clone, Copy)]
+struct Progress {
+    beats: u64,
+    since: HostMicros,
+    /// The lens has been stopped for want of it.
+    stopped: bool,
 }
 
 /// Whether the controller has been told that the lens failed.
@@ -57,7 +72,12 @@ impl LensThread {
     /// Runs until there can be no more orders, then stops the lens.
     pub(crate) fn run(mut self) {
         let mut state = Health::Sound;
+        // A daemon that was killed may have left it moving.
+        if let Err(error) = self.lens.stop() {
+            self.fail(&error, &mut state);
+        }
         let mut next_poll = self.clock.now();
+        let mut progress = Progress { beats: 0, since: next_poll, stopped: false };
         let mut attentive_until = next_poll;
         loop {
             match self.orders.receive(next_poll.since(self.clock.now())) {
@@ -67,6 +87,7 @@ impl LensThread {
                 }
                 Received::Nothing => {
                     next_poll = self.clock.now() + self.look(&mut state, &mut attentive_until);
+                    self.guard(attentive_until, &mut progress, &mut state);
                 }
                 Received::End => break,
             }
@@ -74,6 +95,18 @@ impl LensThread {
         match self.lens.stop() {
             Ok(()) => tracing::info!("the lens is stopped"),
             Err(error) => tracing::warn!(%error, "the lens could not be stopped"),
+        }
+    }
+
+    /// Stops a lens that may be moving while the control thread hangs: nobody watches over it then.
+    fn guard(&mut self, attentive_until: HostMicros, progress: &mut Progress, state: &mut Health) {
+        let (beats, now) = (self.vitals.beats(), self.clock.now());
+        if beats != progress.beats {
+            *progress = Progress { beats, since: now, stopped: false };
+        } else if now < attentive_until && !progress.stopped && now.since(progress.since) >= CONTROL_HANGS {
+            progress.stopped = true;
+            tracing::error!("the control thread hangs, so the lens is stopped");
+            self.obey(Action::StopLens, state);
         }
     }
 
@@ -196,24 +229,26 @@ mod tests {
     struct Bench {
         thread: LensThread,
         wire: Arc<Mutex<Wire>>,
+        clock: Arc<VirtualClock>,
         notices: Consumer<Notice>,
         samples: Consumer<LensSample>,
     }
 
     fn bench() -> Bench {
-        let wire = Arc::new(Mutex::new(Wire::default()));
+        let (wire, clock) = (Arc::new(Mutex::new(Wire::default())), Arc::new(VirtualClock::new()));
         let (samples_in, samples) = RingBuffer::new(SAMPLES);
         let (notices_in, notices) = RingBuffer::new(8);
         let thread = LensThread {
             lens: Box::new(FakeLens(Arc::clone(&wire))),
-            clock: Arc::new(VirtualClock::new()),
+            clock: clock.clone(),
             poll: Duration::from_millis(2),
             orders: orders().1,
             samples: samples_in,
             notices: notices_in,
             control: std::thread::current(),
+            vitals: Vitals::default(),
         };
-        Bench { thread, wire, notices, samples }
+        Bench { thread, wire, clock, notices, samples }
     }
 
     /// Any motion will do.
@@ -239,6 +274,25 @@ mod tests {
         assert_eq!(bench.notices.pop(), Ok(Notice::LensReady));
         assert!(bench.notices.pop().is_err(), "one failure, one recovery");
         assert!(bench.samples.pop().is_ok());
+    }
+
+    #[test]
+    fn a_lens_that_moves_while_the_control_thread_hangs_is_stopped_once() {
+        let mut bench = bench();
+        let (mut health, mut attentive) = (Health::Sound, HostMicros(0));
+        let mut progress = Progress { beats: 0, since: HostMicros(0), stopped: false };
+        let mut told = Vec::new();
+        for second in 1..=9 {
+            bench.clock.advance_to(HostMicros(second * 1_000_000));
+            if second <= 3 || second == 7 {
+                bench.thread.vitals.beat();
+            }
+            attentive = attentive.max(bench.clock.now() + ATTENTION);
+            bench.thread.guard(attentive, &mut progress, &mut health);
+            told.push(bench.wire.lock().unwrap().told.len());
+        }
+        // Beats at 1, 2, 3 and 7 s: two seconds after the third and the last of them the lens is stopped.
+        assert_eq!(told, [0, 0, 0, 0, 1, 1, 1, 1, 2]);
     }
 
     #[test]

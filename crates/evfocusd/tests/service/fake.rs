@@ -13,7 +13,8 @@ use evfocus_ipc::{
     CurvePoint, Device, DeviceRole, DeviceState, Error, FocusRequest, LastRun, LensRange, Mode, Outcome,
     Phase, Progress, REPORT_FORMAT, Report, RunDevices, State, Status,
 };
-use evfocusd::handle::{Command, Handle, Lookups};
+use evfocusd::access::Access;
+use evfocusd::handle::{Command, Handle, Lookups, Reloaded};
 use evfocusd::service;
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
 use tokio::task::JoinHandle;
@@ -85,6 +86,7 @@ impl Rig {
             commands,
             status,
             progress: fake.progress.downgrade(),
+            access: watch::channel(Arc::new(Access::of_everybody())).1,
             lookups: Arc::new(FakeLookups { state: Arc::clone(&fake.state) }),
         };
         let control = tokio::spawn(fake.clone().control(received));
@@ -137,6 +139,7 @@ impl Fake {
                     self.change(|status| status.mode = mode);
                     drop(answer.send(Ok(())));
                 }
+                Command::Configure { .. } => {}
             }
         }
     }
@@ -240,6 +243,10 @@ impl Lookups for FakeLookups {
             None => state.reports.back(),
         };
         report.cloned().ok_or(Error::NoSuchReport { id })
+    }
+
+    fn reload(&self) -> Result<Reloaded, Error> {
+        Ok(Reloaded { applied: vec!["focus".to_owned()], needs_restart: Vec::new() })
     }
 }
 
