@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use evfocus_core::controller::{Command as CoreCommand, Mode};
-use evfocus_core::{Controller, EventBatch, RunId};
+use evfocus_core::{Controller, ControllerConfig, EventBatch, RunId};
 use evfocus_hal::{CameraInfo, Clock, LensInfo, SystemClock};
 use evfocus_ipc::server::Limits;
 use evfocus_ipc::{self as ipc, Device, Error, Report, Status};
@@ -123,27 +123,10 @@ impl Running {
         devices: Devices,
         clock: &Arc<dyn Clock>,
     ) -> anyhow::Result<Self> {
-        let access = Arc::new(Access::of(&config.access)?);
         let (camera_info, lens_info) = (devices.camera.info(), devices.lens.info());
-        let mut settings = config
-            .controller(&lens_info)
-            .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
-        let store = Reports::new(ReportStore::open(&config.state_dir, config.kept()));
-        if let Some(fault) = store.fault() {
-            tracing::error!(%fault, "reports are kept in memory only");
-        }
-        let run_devices = run_devices(&camera_info, &lens_info);
-        // Where another daemon keeps its reports, it keeps its delay too.
-        let rig_delay = (store.fault().is_none())
-            .then(|| RigDelayFile::new(&config.state_dir, &run_devices.camera, &run_devices.lens));
-        settings.delays = rig_delay.as_ref().and_then(RigDelayFile::read).unwrap_or_default();
-        let (saved_delays, pace, limits) = (settings.delays, settings.pace, settings.limits);
-        let mut controller = Controller::new(settings, camera_info.geometry, clock.now());
-        controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
-        if config.mode == Mode::Manual {
-            // An idle controller refuses no change of mode and has nothing to do for it.
-            controller.command(CoreCommand::SetMode(Mode::Manual), clock.now(), &mut Vec::new())?;
-        }
+        let Prepared { controller, access, store, rig_delay, run_devices } =
+            Prepared::new(config, &camera_info, &lens_info, clock)?;
+        let ControllerConfig { delays: saved_delays, pace, limits, .. } = *controller.config();
 
         let (filled_in, filled_out) = RingBuffer::new(BATCHES);
         let (mut empty_in, empty_out) = RingBuffer::new(BATCHES);
@@ -160,13 +143,7 @@ impl Running {
         let (progress_in, _) = broadcast::channel(PROGRESS);
 
         let grants = Grants::default();
-        if config.real_time.lock_memory {
-            grants.lock_memory();
-        }
-        let asked = config.real_time.clone();
-        let control_wish = Wish { priority: asked.control_priority, cpus: asked.control_cpus };
-        let camera_wish = Wish { priority: asked.camera_priority, cpus: asked.camera_cpus };
-        let (access_in, access_out) = watch::channel(access);
+        let [control_wish, camera_wish] = grants.wishes(&config.real_time);
 
         let (stop, vitals) = (StopFlag::default(), Vitals::default());
         let (ended_in, ended) = mpsc::channel(3);
@@ -186,13 +163,7 @@ impl Running {
             publications: Publications { snapshots: snapshots_in, curve: curve_in, reports: reports_in },
             stop: stop.clone(),
         };
-        let control = spawn("evfocus-control", &ended_in, {
-            let (grants, wish) = (grants.clone(), control_wish);
-            move || {
-                grants.ask("control", &wish);
-                control.run();
-            }
-        })?;
+        let control = spawn("evfocus-control", &ended_in, control_wish, move || control.run())?;
         let camera = CameraThread {
             camera: devices.camera,
             clock: Arc::clone(clock),
@@ -212,23 +183,12 @@ impl Running {
             control: control.thread().clone(),
             vitals: vitals.clone(),
         };
-        let camera = spawn("evfocus-camera", &ended_in, {
-            let (grants, wish) = (grants.clone(), camera_wish);
-            move || {
-                grants.ask("camera", &wish);
-                camera.run();
-            }
-        })?;
-        let lens = spawn("evfocus-lens", &ended_in, move || lens.run())?;
+        let camera = spawn("evfocus-camera", &ended_in, camera_wish, move || camera.run())?;
+        let lens = spawn("evfocus-lens", &ended_in, Wish::default(), move || lens.run())?;
 
-        let reloader = Reloader {
-            reread,
-            current: std::sync::Mutex::new(config.clone()),
-            lens: lens_info.clone(),
-            commands: commands_in.clone(),
-            access: access_in,
-            reports: store.clone(),
-        };
+        let (commands, reports) = (commands_in.clone(), store.clone());
+        let access_out = access.subscribe();
+        let reloader = Reloader::new(reread, config, &lens_info, commands, access, reports);
         let lookups = DaemonLookups {
             reloader,
             devices: DeviceList::new(config, camera_info, lens_info),
@@ -321,6 +281,45 @@ impl Running {
     }
 }
 
+/// What is settled before there are threads.
+struct Prepared {
+    controller: Controller,
+    access: watch::Sender<Arc<Access>>,
+    store: Reports,
+    rig_delay: Option<RigDelayFile>,
+    run_devices: ipc::RunDevices,
+}
+
+impl Prepared {
+    fn new(
+        config: &Config,
+        camera: &CameraInfo,
+        lens: &LensInfo,
+        clock: &Arc<dyn Clock>,
+    ) -> anyhow::Result<Self> {
+        let access = watch::Sender::new(Arc::new(Access::of(&config.access)?));
+        let mut settings = config
+            .controller(lens)
+            .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
+        let store = Reports::new(ReportStore::open(&config.state_dir, config.kept()));
+        if let Some(fault) = store.fault() {
+            tracing::error!(%fault, "reports are kept in memory only");
+        }
+        let run_devices = run_devices(camera, lens);
+        // Where another daemon keeps its reports, it keeps its delay too.
+        let rig_delay = (store.fault().is_none())
+            .then(|| RigDelayFile::new(&config.state_dir, &run_devices.camera, &run_devices.lens));
+        settings.delays = rig_delay.as_ref().and_then(RigDelayFile::read).unwrap_or_default();
+        let mut controller = Controller::new(settings, camera.geometry, clock.now());
+        controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
+        if config.mode == Mode::Manual {
+            // An idle controller refuses no change of mode and has nothing to do for it.
+            controller.command(CoreCommand::SetMode(Mode::Manual), clock.now(), &mut Vec::new())?;
+        }
+        Ok(Self { controller, access, store, rig_delay, run_devices })
+    }
+}
+
 fn run_devices(camera: &CameraInfo, lens: &LensInfo) -> ipc::RunDevices {
     ipc::RunDevices {
         camera: devices::name(&camera.model, &camera.serial),
@@ -333,6 +332,7 @@ fn run_devices(camera: &CameraInfo, lens: &LensInfo) -> ipc::RunDevices {
 fn spawn(
     name: &str,
     ended: &mpsc::Sender<()>,
+    wish: Wish,
     body: impl FnOnce() + Send + 'static,
 ) -> anyhow::Result<JoinHandle<()>> {
     struct Ended(mpsc::Sender<()>);
@@ -347,6 +347,7 @@ fn spawn(
         .name(name.to_owned())
         .spawn(move || {
             let _ended = ended;
+            wish.ask();
             body();
         })
         .with_context(|| format!("cannot start the thread {name}"))

@@ -12,17 +12,20 @@ use thread_priority::{
     set_thread_priority_and_policy, thread_native_id,
 };
 
+use crate::config::RealTimeSection;
+
 /// What was asked for so far, and what came of it. Clones share the same list.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Grants(Arc<Mutex<Vec<Grant>>>);
 
-/// What a thread asks for.
+/// What a thread asks for once it runs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Wish {
-    /// Priority under `SCHED_FIFO`.
-    pub(crate) priority: Option<u8>,
-    /// Processors.
-    pub(crate) cpus: Option<Vec<u16>>,
+    name: &'static str,
+    /// Under `SCHED_FIFO`.
+    priority: Option<u8>,
+    cpus: Option<Vec<u16>>,
+    grants: Grants,
 }
 
 impl Grants {
@@ -31,35 +34,27 @@ impl Grants {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Locks memory as it is touched: the buffers are large, and most of their pages are never used.
-    pub(crate) fn lock_memory(&self) {
-        let locked = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT);
-        self.note("memory", "locked", locked, "LimitMEMLOCK=infinity in the unit, or ulimit -l unlimited");
+    /// What the control thread and the camera's are to ask for. Memory is locked at once, if that is asked for.
+    pub(crate) fn wishes(&self, asked: &RealTimeSection) -> [Wish; 2] {
+        if asked.lock_memory {
+            self.lock_memory();
+        }
+        let wish = |name, priority, cpus: &Option<Vec<u16>>| Wish {
+            name,
+            priority,
+            cpus: cpus.clone(),
+            grants: self.clone(),
+        };
+        [
+            wish("control", asked.control_priority, &asked.control_cpus),
+            wish("camera", asked.camera_priority, &asked.camera_cpus),
+        ]
     }
 
-    /// Asks for what the calling thread, called `name`, wishes.
-    pub(crate) fn ask(&self, name: &str, wish: &Wish) {
-        if let Some(priority) = wish.priority {
-            self.note(
-                &format!("{name} scheduling"),
-                &format!("SCHED_FIFO {priority}"),
-                fifo(priority),
-                &format!("LimitRTPRIO={priority} in the unit, or ulimit -r {priority}"),
-            );
-        }
-        if let Some(cpus) = &wish.cpus {
-            let mut set = CpuSet::new();
-            for &cpu in cpus {
-                set.set(usize::from(cpu));
-            }
-            let names: Vec<String> = cpus.iter().map(u16::to_string).collect();
-            self.note(
-                &format!("{name} processors"),
-                &names.join(" "),
-                sched_setaffinity(None, &set),
-                "name processors that this machine has and the unit allows (CPUAffinity=, AllowedCPUs=)",
-            );
-        }
+    /// Locks memory as it is touched: the buffers are large, and most of their pages are never used.
+    fn lock_memory(&self) {
+        let locked = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT);
+        self.note("memory", "locked", locked, "LimitMEMLOCK=infinity in the unit, or ulimit -l unlimited");
     }
 
     fn note<Failure: std::fmt::Display>(
@@ -80,6 +75,34 @@ impl Grants {
     }
 }
 
+impl Wish {
+    /// Asks for it on behalf of the calling thread.
+    pub(crate) fn ask(&self) {
+        let Self { name, priority, cpus, grants } = self;
+        if let Some(priority) = *priority {
+            grants.note(
+                &format!("{name} scheduling"),
+                &format!("SCHED_FIFO {priority}"),
+                fifo(priority),
+                &format!("LimitRTPRIO={priority} in the unit, or ulimit -r {priority}"),
+            );
+        }
+        if let Some(cpus) = cpus {
+            let mut set = CpuSet::new();
+            for &cpu in cpus {
+                set.set(usize::from(cpu));
+            }
+            let names: Vec<String> = cpus.iter().map(u16::to_string).collect();
+            grants.note(
+                &format!("{name} processors"),
+                &names.join(" "),
+                sched_setaffinity(None, &set),
+                "name processors that this machine has and the unit allows (CPUAffinity=, AllowedCPUs=)",
+            );
+        }
+    }
+}
+
 fn fifo(priority: u8) -> Result<(), String> {
     let value = ThreadPriorityValue::try_from(priority).map_err(|refused| format!("{refused:?}"))?;
     set_thread_priority_and_policy(
@@ -89,7 +112,9 @@ fn fifo(priority: u8) -> Result<(), String> {
     )
     .map_err(|error| match error {
         thread_priority::Error::OS(number) => std::io::Error::from_raw_os_error(number).to_string(),
-        other => format!("{other:?}"),
+        other @ (thread_priority::Error::Priority(_)
+        | thread_priority::Error::PriorityNotInRange(_)
+        | thread_priority::Error::Ffi(_)) => format!("{other:?}"),
     })
 }
 
@@ -100,7 +125,10 @@ mod tests {
     #[test]
     fn a_processor_that_is_not_there_is_refused_and_said_with_its_remedy() {
         let grants = Grants::default();
-        grants.ask("camera", &Wish { priority: None, cpus: Some(vec![1000]) });
+        let section = RealTimeSection { camera_cpus: Some(vec![1000]), ..RealTimeSection::default() };
+        for wish in grants.wishes(&section) {
+            wish.ask();
+        }
         let [grant] = grants.list().try_into().unwrap();
         assert!(!grant.granted && grant.asked == "1000" && grant.what == "camera processors", "{grant:?}");
         assert!(grant.remedy.unwrap().contains("AllowedCPUs="));
@@ -109,7 +137,9 @@ mod tests {
     #[test]
     fn nothing_asked_nothing_noted() {
         let grants = Grants::default();
-        grants.ask("control", &Wish::default());
+        for wish in grants.wishes(&RealTimeSection::default()) {
+            wish.ask();
+        }
         assert!(grants.list().is_empty());
     }
 }

@@ -17,13 +17,13 @@ pub type Reread = Box<dyn Fn() -> Result<Config, ConfigError> + Send + Sync>;
 
 /// Applies what can be changed while running: `[focus]`, `[access]`, the play of the lens, and how many reports are kept.
 pub(crate) struct Reloader {
-    pub(crate) reread: Reread,
+    reread: Reread,
     /// What holds now.
-    pub(crate) current: Mutex<Config>,
-    pub(crate) lens: LensInfo,
-    pub(crate) commands: mpsc::Sender<Command>,
-    pub(crate) access: watch::Sender<Arc<Access>>,
-    pub(crate) reports: Reports,
+    current: Mutex<Config>,
+    lens: LensInfo,
+    commands: mpsc::Sender<Command>,
+    access: watch::Sender<Arc<Access>>,
+    reports: Reports,
 }
 
 impl std::fmt::Debug for Reloader {
@@ -33,6 +33,19 @@ impl std::fmt::Debug for Reloader {
 }
 
 impl Reloader {
+    /// `config` holds now; `reread` has what is to hold.
+    pub(crate) fn new(
+        reread: Reread,
+        config: &Config,
+        lens: &LensInfo,
+        commands: mpsc::Sender<Command>,
+        access: watch::Sender<Arc<Access>>,
+        reports: Reports,
+    ) -> Self {
+        let current = Mutex::new(config.clone());
+        Self { reread, current, lens: lens.clone(), commands, access, reports }
+    }
+
     /// Reads and applies all of it or nothing.
     ///
     /// # Errors

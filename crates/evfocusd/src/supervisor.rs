@@ -51,14 +51,14 @@ pub(crate) struct Supervisor {
 }
 
 impl Supervisor {
-    /// Runs for ever. The watchdog is fed only when the control thread has passed through its loop since the last time, so it
+    /// Runs until the daemon has no more status. The watchdog is fed only when the control thread has passed through its loop since the last time, so it
     /// bites when that thread hangs, and when this one does.
     pub(crate) async fn run(mut self) {
         let watchdog = sd_notify::watchdog_enabled();
         let mut looks = interval(watchdog.map_or(UNWATCHED, |time| time / LOOKS));
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (mut seen, mut told) = (self.vitals.beats(), String::new());
-        loop {
+        while self.status.has_changed().is_ok() {
             looks.tick().await;
             let beats = self.vitals.beats();
             if watchdog.is_some() && beats != seen {

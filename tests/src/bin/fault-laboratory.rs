@@ -1,6 +1,8 @@
 //! Makes runs with things going wrong, and prints how they ended: `fault-laboratory [N [SEED]]`, 1000 from seed 1 unless given. Exit
 //! status 3 if an invariant was broken, with the seed.
 
+#![expect(clippy::print_stdout, reason = "this is what the program is for")]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::ExitCode;
 use std::sync::Mutex;

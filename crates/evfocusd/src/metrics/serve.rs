@@ -23,6 +23,7 @@ const REQUEST_BYTES: u64 = 8 * 1024;
 const FILE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Answers every request on `socket` with the figures, for ever.
+#[expect(clippy::infinite_loop, reason = "it ends with its task")]
 pub(crate) async fn answer(socket: Socket, metrics: Metrics) {
     let mut scrapers = JoinSet::new();
     loop {
@@ -61,6 +62,7 @@ async fn reply(mut stream: UnixStream, text: String) -> io::Result<()> {
 }
 
 /// Writes the figures to the file at `path` now and then, for ever.
+#[expect(clippy::infinite_loop, reason = "it ends with its task")]
 pub(crate) async fn keep_file(path: PathBuf, metrics: Metrics) {
     let mut failed = false;
     let mut times = tokio::time::interval(FILE_INTERVAL);
