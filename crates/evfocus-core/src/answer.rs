@@ -330,6 +330,19 @@ mod tests {
     }
 
     #[test]
+    fn a_peak_within_and_one_at_the_edge_contradict_each_other() {
+        let (there, edge) = (structure_answer(1006.0, 9.0, 1000.0), structure_answer(5.0, 9.0, -1000.0));
+        for (first, second) in [(there, edge), (edge, there)] {
+            let Err(Failure::DirectionMismatch { forward, backward, .. }) = both(&first, &second) else {
+                panic!("{:?}", both(&first, &second))
+            };
+            assert!((forward.0 < 10.0) == (first == edge) && (backward.0 < 10.0) == (second == edge));
+        }
+        let twice = both(&edge, &edge);
+        assert!(matches!(twice, Err(Failure::PeakAtEdge { .. })), "{twice:?}");
+    }
+
+    #[test]
     fn what_is_highest_at_an_end_is_no_peak() {
         let at_end = answer(&leg(&structure_answer(3490.0, 9.0, 20_000.0)), None, Method::Auto, &rules());
         assert!(matches!(at_end, Err(Failure::PeakAtEdge { .. })), "{at_end:?}");

@@ -118,13 +118,13 @@ impl Ceiling {
         let mut before = 0.0;
         for count in windows(sweep, CEILING_WINDOW_US) {
             let count = count?;
-            if count > ceiling {
-                at_ceiling += 1;
-                // Differences of neighbours, so that a slow change of the rate drops out.
-                if before > ceiling {
-                    squares += (count - before) * (count - before) / 2.0;
-                    sum += f64::midpoint(before, count);
-                }
+            at_ceiling += u32::from(count > ceiling);
+            // Differences of neighbours, so that a slow change of the rate drops out. Chosen by their mean, which says nothing of how
+            // far chance puts them apart; choosing each of them would leave out what is far apart.
+            let mean = f64::midpoint(before, count);
+            if mean > ceiling {
+                squares += (count - before) * (count - before) / 2.0;
+                sum += mean;
             }
             before = count;
         }

@@ -40,6 +40,12 @@ pub(super) fn by_structure_both_ways(
         (there, Err(failure)) => (there?, failure),
         (Ok(there), Ok(back)) => return combine(&there, &back, rules),
     };
+    // What lies beyond the range for one way lies beyond it for the other too.
+    if let Failure::PeakAtEdge { position } = failure {
+        let believed = believed.position;
+        let (forward, backward) = if there.is_ok() { (believed, position) } else { (position, believed) };
+        return Err(Failure::DirectionMismatch { forward, backward, suspicion: Suspicion::DifferentPeaks });
+    }
     let flag = failure.doubt().ok_or(failure)?;
     let mut answer = by_structure(&believed, rules);
     answer.flags.set(flag, true);
