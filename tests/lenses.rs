@@ -3,23 +3,21 @@
 
 #![expect(clippy::print_stdout, reason = "the figures belong in the output")]
 
-use std::path::Path;
+use std::time::Duration;
 
 use anyhow::{Context, Result};
+use evfocus_core::Outcome;
 use evfocus_core::controller::FocusRequest;
-use evfocus_core::{LensPosition, Outcome};
+use evfocus_hal::DeviceErrorKind;
+use evfocus_tests::lens_faults::{Aftermath, MidSweep, Opening, open_error, strike};
+use evfocus_tests::lenses::{LENSES, config, section};
 use evfocusd::config::LensBackend;
 use evfocusd::{Config, VirtualRig};
-use hil_sim::{Fault, FaultKind, FaultTrigger};
 
 /// Mean errors below this are good enough, whatever the plain lens does: a blur of one pixel is 50 counts here.
 const GOOD_ENOUGH: f64 = 1.0;
 /// How much worse than the plain simulated lens a lens may be behind its protocol.
 const LARGEST_RATIO: f64 = 1.5;
-
-fn config(lens: &str, seed: u64) -> Result<Config> {
-    Ok(Config::parse(&format!("[simulation]\nseed = {seed}\n[lens]\n{lens}"), Path::new("(in the test)"))?)
-}
 
 /// Error against truth, counts, and the run's length, seconds.
 fn focus(config: &Config) -> Result<(f64, f64)> {
@@ -34,11 +32,11 @@ fn focus(config: &Config) -> Result<(f64, f64)> {
 }
 
 /// Runs the lens of `section` and the plain one of the same range and speed on several seeds, prints both, and compares.
-fn compare(name: &str, section: &str) -> Result<()> {
+fn compare(name: &str) -> Result<()> {
     let (mut behind, mut plain) = (0.0, 0.0);
     let seeds = [1, 2];
     for seed in seeds {
-        let wired = config(section, seed)?;
+        let wired = config(section(name)?, seed)?;
         let direct = Config { lens: LensBackend::Simulated, ..wired.clone() };
         let ((error, elapsed), (plain_error, plain_elapsed)) = (focus(&wired)?, focus(&direct)?);
         println!(
@@ -52,92 +50,102 @@ fn compare(name: &str, section: &str) -> Result<()> {
     Ok(())
 }
 
-/// Each driver before the model of its device.
-const MOONLITE: &str =
-    "backend = \"moonlite\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 1
-    [lens.moonlite]\nmax_speed_counts_per_s = 1000";
-const OPTOTUNE: &str = "backend = \"optotune\"\nport = \"emulated\"\npoll_ms = 1
-    [lens.optotune]\nmax_speed_counts_per_s = 1765";
-const GRBL: &str =
-    "backend = \"grbl\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 20";
-const FIRMATA: &str =
-    "backend = \"firmata\"\nport = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 2";
-const LABJACK: &str =
-    "backend = \"labjack\"\naddress = \"emulated\"\nmin_counts = 220\nmax_counts = 3750\npoll_ms = 2";
-const INDI: &str = "backend = \"indi\"\naddress = \"emulated\"\npoll_ms = 2
-    [lens.indi]\ndevice = \"Focuser\"\nmax_speed_counts_per_s = 1765";
-
 #[test]
 fn moonlite_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare("moonlite", MOONLITE)
+    compare("moonlite")
 }
 
 #[test]
 fn optotune_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare("optotune", OPTOTUNE)
+    compare("optotune")
 }
 
 #[test]
 fn grbl_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare("grbl", GRBL)
+    compare("grbl")
 }
 
 #[test]
 fn firmata_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare("firmata", FIRMATA)
+    compare("firmata")
 }
 
 #[test]
 fn labjack_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare("labjack", LABJACK)
+    compare("labjack")
 }
 
 #[test]
 fn indi_focuses_as_well_as_the_plain_lens() -> Result<()> {
-    compare("indi", INDI)
+    compare("indi")
 }
 
-/// A run in which `kind` strikes in the middle of the first sweep: the reason that it gives, and how far the glass went on.
-fn fail(section: &str, kind: FaultKind) -> Result<(&'static str, f64)> {
-    let mut config = config(section, 1)?;
-    let struck = LensPosition(1500.0);
-    config.rig.faults = vec![Fault { kind, trigger: FaultTrigger::AtPosition(struck) }];
-    let mut rig = VirtualRig::new(&config)?;
-    let report = rig.focus(FocusRequest::default(), |_, _, _| {})?;
-    let reason = match report.outcome {
-        Outcome::Failed(failure) => failure.name(),
-        Outcome::Focused { .. } => "focused",
-        Outcome::Aborted => "aborted",
-    };
-    Ok((reason, rig.rig().glass(rig.now()).distance(struck)))
+/// How much longer than its stopping time a lens may move after a fault that leaves it able to hear.
+const REACTION: Duration = Duration::from_millis(100);
+
+/// Strikes with `fault` in the middle of a sweep through every driver; the reasons, in the order of [`LENSES`].
+fn strike_all(fault: MidSweep) -> Result<Vec<Aftermath>> {
+    LENSES
+        .iter()
+        .map(|lens| {
+            let came = strike(lens, fault)?;
+            println!("{}, {}: {came}", fault.name(), lens.name);
+            assert!(
+                came.moved_on <= REACTION + came.stopping || fault == MidSweep::Unplugged,
+                "{}: {came}",
+                lens.name
+            );
+            Ok(came)
+        })
+        .collect()
 }
 
 #[test]
-fn a_cable_pulled_in_mid_sweep_is_a_lost_lens() -> Result<()> {
-    for section in [MOONLITE, OPTOTUNE, GRBL, FIRMATA, LABJACK, INDI] {
-        assert_eq!(fail(section, FaultKind::LensUnplugged)?.0, "lens-lost", "{section}");
+fn a_cable_pulled_in_mid_sweep_is_a_lost_lens_and_comes_back() -> Result<()> {
+    for came in strike_all(MidSweep::Unplugged)? {
+        assert_eq!((came.reason, came.afterwards.as_str()), ("lens-lost", "focused"), "{came}");
     }
     Ok(())
 }
 
 #[test]
-fn a_lens_that_falls_silent_in_mid_sweep_is_named() -> Result<()> {
-    for section in [MOONLITE, OPTOTUNE, GRBL, FIRMATA, LABJACK] {
-        let (reason, further) = fail(section, FaultKind::LensSilent)?;
-        println!("{section}: {reason}, {further:.0} counts further");
-        assert_eq!(reason, "lens-silent", "{section}");
+fn a_lens_that_falls_silent_in_mid_sweep_is_named_stopped_and_comes_back() -> Result<()> {
+    for came in strike_all(MidSweep::Silence)? {
+        assert_eq!((came.reason, came.afterwards.as_str()), ("lens-silent", "focused"), "{came}");
     }
-    // A server that says nothing of a motion is one whose focuser does not move.
-    assert_eq!(fail(INDI, FaultKind::LensSilent)?.0, "lens-stopped-short");
+    Ok(())
+}
+
+#[test]
+fn garbage_in_mid_sweep_is_named_and_the_lens_stopped() -> Result<()> {
+    for came in strike_all(MidSweep::Garbage)? {
+        assert!(["lens-silent", "lens-fault", "lens-lost"].contains(&came.reason), "{came}");
+        assert_eq!(came.afterwards, "focused", "{came}");
+    }
     Ok(())
 }
 
 #[test]
 fn a_lens_that_sticks_in_mid_sweep_does_not_focus() -> Result<()> {
-    for section in [MOONLITE, OPTOTUNE, GRBL, FIRMATA, LABJACK, INDI] {
-        let (reason, further) = fail(section, FaultKind::LensStalled)?;
-        println!("{section}: {reason}, {further:.0} counts further");
-        assert!(!["focused", "aborted"].contains(&reason), "{section}: {reason}");
+    for came in strike_all(MidSweep::Stalled)? {
+        assert!(!["focused", "aborted", "none"].contains(&came.reason), "{came}");
+    }
+    Ok(())
+}
+
+#[test]
+fn what_is_wrong_at_the_start_has_its_name() -> Result<()> {
+    for lens in &LENSES {
+        for (opening, kinds) in [
+            (Opening::NoSuchPort, &[DeviceErrorKind::Disconnected][..]),
+            (Opening::InUse, &[DeviceErrorKind::Busy]),
+            (Opening::OtherDevice, &[DeviceErrorKind::TimedOut, DeviceErrorKind::Protocol]),
+            (Opening::Silence, &[DeviceErrorKind::TimedOut]),
+            (Opening::WrongBaud, &[DeviceErrorKind::TimedOut, DeviceErrorKind::Protocol]),
+        ] {
+            let error = open_error(lens, opening)?;
+            assert!(kinds.contains(&error.kind), "{}, {}: {error}", lens.name, opening.name());
+        }
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ use std::cell::Cell;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 pub use config::{LensConfig, LensKind};
 pub(crate) use profile::Spring;
@@ -98,6 +98,8 @@ impl Lens for SimLens {
         let state = lock(&self.state);
         LensInfo {
             model: MODEL.to_owned(),
+            class: LensClass::Positioner,
+            speed_is_share: false,
             serial: self.serial.clone(),
             range: state.config().range,
             max_speed: state.config().max_speed,

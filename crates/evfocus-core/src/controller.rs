@@ -133,6 +133,11 @@ impl Controller {
         true
     }
 
+    /// Counts on `delays` from now on, whatever was learnt.
+    pub fn set_delays(&mut self, delays: DelayModel) {
+        self.delays = delays;
+    }
+
     /// The next run gets this number or a higher one: numbers go on after a restart.
     pub fn number_runs_from(&mut self, first: RunId) {
         self.next_run = self.next_run.max(first.0);

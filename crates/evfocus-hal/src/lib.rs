@@ -15,5 +15,5 @@ pub mod usb;
 pub use camera::{Camera, CameraInfo};
 pub use clock::{Clock, SystemClock, VirtualClock, unix_time};
 pub use error::{DeviceError, DeviceErrorKind};
-pub use lens::{Lens, LensInfo};
+pub use lens::{Lens, LensClass, LensInfo};
 pub use transport::{Connect, Transport};

@@ -19,7 +19,7 @@ pub use results::Reloaded;
 
 use crate::frame::{FrameReader, encode};
 use crate::message::{Call, Incoming};
-use crate::{Device, FocusRequest, INTERFACE, Mode, Progress, Report, Request, Status};
+use crate::{Calibration, Device, FocusRequest, INTERFACE, Mode, Progress, Report, Request, Status};
 
 /// The longest reply taken, in bytes: far above any report, far below any memory.
 const REPLY_BYTES: usize = 64 * 1024 * 1024;
@@ -78,6 +78,13 @@ impl Client {
         self.call::<results::Nothing>(&Request::MoveTo { position }).await.map(drop)
     }
 
+    /// Measures the lens, however long that takes: its way there and back, and two focus runs.
+    pub async fn calibrate(&mut self) -> Result<Calibration, ClientError> {
+        self.send(&Request::Calibrate, false).await?;
+        let (results, _continues): (results::OfCalibrate, bool) = self.receive().await?;
+        Ok(results.calibration)
+    }
+
     /// Changes the mode.
     pub async fn set_mode(&mut self, mode: Mode) -> Result<(), ClientError> {
         self.call::<results::Nothing>(&Request::SetMode { mode }).await.map(drop)
@@ -96,7 +103,14 @@ impl Client {
 
     /// The cameras and lenses in use, attached or configured.
     pub async fn devices(&mut self) -> Result<Vec<Device>, ClientError> {
-        Ok(self.call::<results::OfDevices>(&Request::ListDevices).await?.devices)
+        Ok(self.call::<results::OfDevices>(&Request::ListDevices { probe: None }).await?.devices)
+    }
+
+    /// The same, and what answers on the free serial ports `probe`, on those on USB if there are none; takes up to 8 s a port.
+    pub async fn devices_asked(&mut self, probe: Vec<String>) -> Result<Vec<Device>, ClientError> {
+        self.send(&Request::ListDevices { probe: Some(probe) }, false).await?;
+        let (results, _continues): (results::OfDevices, bool) = self.receive().await?;
+        Ok(results.devices)
     }
 
     /// Has the daemon read its configuration anew.

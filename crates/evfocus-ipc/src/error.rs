@@ -96,6 +96,16 @@ pub enum Error {
         /// What happened, and what to do.
         message: String,
     },
+    /// The lens could not be calibrated; it stands still.
+    #[error("{reason}: {message}")]
+    #[serde(rename = "org.evfocus.Controller.CalibrationFailed")]
+    CalibrationFailed {
+        /// `aborted`, or what a focus run would call it: `lens-lost`, `lens-fault`, `lens-silent`, `lens-not-moving`,
+        /// `lens-wrong-way`, `timed-out`.
+        reason: String,
+        /// What happened, and what to do.
+        message: String,
+    },
     /// A report or a recording could not be read or written.
     #[error("{path}: {message}")]
     #[serde(rename = "org.evfocus.Controller.StorageFailed")]

@@ -3,7 +3,7 @@
 //! [Varlink](https://varlink.org) is JSON objects, each ended by a NUL byte, over a Unix stream socket. The interface is
 //! described in `org.evfocus.Controller.varlink` ([`DESCRIPTION`]), which the daemon also serves to any client that asks.
 //!
-//! - Wire types: [`Status`], [`FocusRequest`], [`Progress`], [`Report`], [`Device`], and the typed errors, [`Error`].
+//! - Wire types: [`Status`], [`FocusRequest`], [`Progress`], [`Report`], [`Device`], [`Calibration`], and the typed errors, [`Error`].
 //!   [`Report`] is the report file of a run as well. They carry plain numbers with the unit in the name or in the
 //!   documentation; the inner crates' types do not appear here.
 //! - [`client`]: what the command line uses, and any other Rust program may.
@@ -11,6 +11,7 @@
 //!
 //! Not here: what the methods do. That is the daemon's, behind [`server::Service`].
 
+mod calibration;
 pub mod client;
 mod device;
 mod error;
@@ -24,6 +25,7 @@ pub mod server;
 mod status;
 mod sweep;
 
+pub use calibration::{CALIBRATION_FORMAT, Calibration};
 pub use device::{Device, DeviceRole, DeviceState};
 pub use error::{Error, ProtocolError};
 pub use focus::{CurvePoint, FocusRequest, FocusWindow, LensRange, Progress, WindowUnit};

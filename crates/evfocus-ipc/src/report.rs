@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{FocusMap, FocusRequest, Phase, State, Sweep, WindowAnswer};
+use crate::{Calibration, FocusMap, FocusRequest, Phase, State, Sweep, WindowAnswer};
 
 /// The value of [`Report::format`] that this version writes. It grows only when a field changes its meaning or goes away;
 /// new fields do not count, readers ignore what they do not know.
@@ -39,6 +39,9 @@ pub struct Report {
     /// How late the pixels are, as far as the runs up to this one have taught.
     #[serde(default)]
     pub rig_delay: Option<RigDelay>,
+    /// What was known of the lens by measurement, and counted on; nothing if it was not calibrated.
+    #[serde(default)]
+    pub calibration: Option<Calibration>,
     /// Hot pixels that were left out.
     pub hot_pixels: u64,
     /// The relation of the camera's clock to the host's; nothing if the run ended before one was known.

@@ -6,7 +6,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use crate::{Device, Error, FocusRequest, FocusWindow, LensRange, Mode, Progress, Report, Status};
+use crate::{
+    Calibration, Device, Error, FocusRequest, FocusWindow, LensRange, Mode, Progress, Report, Status,
+};
 
 /// Longest part of a wrong argument that is quoted back, in characters.
 const QUOTED_CHARS: usize = 100;
@@ -25,6 +27,8 @@ pub enum Request {
         /// Where to, in counts.
         position: f64,
     },
+    /// Measure the lens.
+    Calibrate,
     /// Change the mode.
     SetMode {
         /// The new mode.
@@ -38,7 +42,10 @@ pub enum Request {
         id: Option<u64>,
     },
     /// Which devices are there?
-    ListDevices,
+    ListDevices {
+        /// Free serial ports to ask what answers there: all that are on USB if empty; absent: none.
+        probe: Option<Vec<String>>,
+    },
     /// Read the configuration anew.
     Reload,
 }
@@ -67,6 +74,11 @@ pub enum Reply {
         /// The cameras and lenses.
         devices: Vec<Device>,
     },
+    /// To `Calibrate`.
+    Calibration {
+        /// What was measured.
+        calibration: Box<Calibration>,
+    },
     /// To `Abort`.
     Aborted {
         /// The run that was stopped; nothing if none was under way.
@@ -85,8 +97,18 @@ pub enum Reply {
 
 impl Request {
     /// The names of the interface's methods.
-    pub const NAMES: [&str; 9] =
-        ["GetStatus", "Focus", "Abort", "MoveTo", "SetMode", "Monitor", "GetReport", "ListDevices", "Reload"];
+    pub const NAMES: [&str; 10] = [
+        "GetStatus",
+        "Focus",
+        "Abort",
+        "MoveTo",
+        "Calibrate",
+        "SetMode",
+        "Monitor",
+        "GetReport",
+        "ListDevices",
+        "Reload",
+    ];
 
     /// The method called `name` with `parameters`; nothing if there is no such method.
     pub(crate) fn parse(name: &str, parameters: Map<String, Value>) -> Option<Result<Self, Error>> {
@@ -96,10 +118,11 @@ impl Request {
             "Focus" => arguments.focus_request().map(Self::Focus),
             "Abort" => Ok(Self::Abort),
             "MoveTo" => arguments.take("position").map(|position| Self::MoveTo { position }),
+            "Calibrate" => Ok(Self::Calibrate),
             "SetMode" => arguments.take("mode").map(|mode| Self::SetMode { mode }),
             "Monitor" => Ok(Self::Monitor),
             "GetReport" => arguments.take("id").map(|id| Self::GetReport { id }),
-            "ListDevices" => Ok(Self::ListDevices),
+            "ListDevices" => arguments.take("probe").map(|probe| Self::ListDevices { probe }),
             "Reload" => Ok(Self::Reload),
             _ => return None,
         };
@@ -113,10 +136,11 @@ impl Request {
             Self::Focus(_) => "Focus",
             Self::Abort => "Abort",
             Self::MoveTo { .. } => "MoveTo",
+            Self::Calibrate => "Calibrate",
             Self::SetMode { .. } => "SetMode",
             Self::Monitor => "Monitor",
             Self::GetReport { .. } => "GetReport",
-            Self::ListDevices => "ListDevices",
+            Self::ListDevices { .. } => "ListDevices",
             Self::Reload => "Reload",
         }
     }
@@ -124,21 +148,29 @@ impl Request {
     /// Whether it does something, rather than tell.
     pub fn controls(&self) -> bool {
         match self {
-            Self::Focus(_) | Self::Abort | Self::MoveTo { .. } | Self::SetMode { .. } | Self::Reload => true,
-            Self::GetStatus | Self::Monitor | Self::GetReport { .. } | Self::ListDevices => false,
+            Self::Focus(_)
+            | Self::Abort
+            | Self::MoveTo { .. }
+            | Self::Calibrate
+            | Self::SetMode { .. }
+            | Self::Reload
+            // Asking a port resets what is on it.
+            | Self::ListDevices { probe: Some(_) } => true,
+            Self::GetStatus | Self::Monitor | Self::GetReport { .. } | Self::ListDevices { probe: None } => false,
         }
     }
 
     /// The method's arguments.
     pub(crate) fn parameters(&self) -> Result<Map<String, Value>, serde_json::Error> {
         let value = match self {
-            Self::GetStatus | Self::Abort | Self::Monitor | Self::ListDevices | Self::Reload => {
+            Self::GetStatus | Self::Abort | Self::Calibrate | Self::Monitor | Self::Reload => {
                 return Ok(Map::new());
             }
             Self::Focus(request) => serde_json::to_value(request)?,
             Self::MoveTo { position } => serde_json::json!({ "position": position }),
             Self::SetMode { mode } => serde_json::json!({ "mode": mode }),
             Self::GetReport { id } => serde_json::json!({ "id": id }),
+            Self::ListDevices { probe } => serde_json::json!({ "probe": probe }),
         };
         serde_json::from_value(value)
     }
@@ -207,11 +239,13 @@ mod tests {
             }),
             Request::Abort,
             Request::MoveTo { position: 1234.5 },
+            Request::Calibrate,
             Request::SetMode { mode: Mode::Manual },
             Request::Monitor,
             Request::GetReport { id: Some(7) },
             Request::GetReport { id: None },
-            Request::ListDevices,
+            Request::ListDevices { probe: None },
+            Request::ListDevices { probe: Some(vec!["/dev/ttyUSB0".into()]) },
         ] {
             let parsed = Request::parse(request.name(), request.parameters().unwrap()).unwrap();
             assert_eq!(parsed, Ok(request));

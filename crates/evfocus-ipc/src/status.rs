@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::LensRange;
+use crate::{Calibration, LensRange};
 
 /// Who decides about the lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -57,6 +57,8 @@ pub enum Phase {
     Verifying,
     /// The run failed and the lens goes back to where it was.
     Restoring,
+    /// No run: the lens is being calibrated.
+    Calibrating,
 }
 
 impl Mode {
@@ -95,6 +97,7 @@ impl Phase {
             Self::Approaching => "approaching",
             Self::Verifying => "verifying",
             Self::Restoring => "restoring",
+            Self::Calibrating => "calibrating",
         }
     }
 }
@@ -144,6 +147,9 @@ pub struct Status {
     pub camera: Option<String>,
     /// The lens in use, model and serial; nothing while none is there.
     pub lens: Option<String>,
+    /// What was measured of the lens in use, and is counted on; nothing if it was not calibrated.
+    #[serde(default)]
+    pub calibration: Option<Calibration>,
     /// What is wrong at the moment, in words, with what to do about it; nothing if all is well.
     pub fault: Option<String>,
     /// What was asked of the operating system for real time, and whether it was granted; empty if nothing was.

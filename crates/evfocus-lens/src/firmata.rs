@@ -26,7 +26,7 @@ pub const BAUD: u32 = 57_600;
 const BOOTING: Duration = Duration::from_secs(1);
 const ATTEMPTS: u32 = 3;
 /// Without a reading for this long the motor is stopped.
-const SILENCE: Duration = Duration::from_millis(100);
+const SILENCE: Duration = Duration::from_millis(80);
 /// The fastest stream that the firmware makes.
 const INTERVAL_MS: u16 = 1;
 /// Three bytes on the line.

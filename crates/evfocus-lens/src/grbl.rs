@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::continuity::Continuity;
@@ -28,6 +28,9 @@ pub const BAUD: u32 = 115_200;
 /// Longest wait for a status report or an `ok`.
 const ANSWER: Duration = Duration::from_millis(300);
 const ATTEMPTS: u32 = 3;
+/// A motor whose controller is silent is stopped within 100 ms; question and answer take 3 to 12.
+const MOVING_ANSWER: Duration = Duration::from_millis(35);
+const MOVING_ATTEMPTS: u32 = 2;
 /// An idle machine this near to its target has arrived, steps.
 const ARRIVED: f64 = 1.5;
 /// A jog that was taken and does not show by then has ended before anybody looked.
@@ -129,11 +132,13 @@ impl Grbl {
 
     /// Asks where the axis is.
     fn report(&mut self) -> Result<Timed<Report>, DeviceError> {
-        for _ in 0..ATTEMPTS {
+        let (patience, attempts) =
+            if self.motion == Motion::Rest { (ANSWER, ATTEMPTS) } else { (MOVING_ANSWER, MOVING_ATTEMPTS) };
+        for _ in 0..attempts {
             self.heed_waiting()?;
             let requested = self.line.now();
             self.line.send(&[protocol::STATUS])?;
-            let deadline = self.line.now() + ANSWER;
+            let deadline = self.line.now() + patience;
             while let Some(message) = next(&mut self.line, &mut self.lines, deadline)? {
                 if let Message::Status { state, machine, work, offset } = message {
                     self.offset = offset.unwrap_or(self.offset);
@@ -149,7 +154,7 @@ impl Grbl {
             }
         }
         let what =
-            format!("no status report within {ANSWER:?}, asked {ATTEMPTS} times; check power and cable");
+            format!("no status report within {patience:?}, asked {attempts} times; check power and cable");
         Err(self.line.error(DeviceErrorKind::TimedOut, what))
     }
 
@@ -246,9 +251,11 @@ impl Lens for Grbl {
     fn info(&self) -> LensInfo {
         LensInfo {
             model: "GRBL controller".to_owned(),
+            class: LensClass::Positioner,
             serial: self.line.place().to_owned(),
             range: self.config.range,
             max_speed: self.max_speed,
+            speed_is_share: false,
             needs_homing: self.config.needs_homing,
         }
     }
@@ -305,7 +312,12 @@ impl Lens for Grbl {
         {
             return Ok(sample);
         }
-        let Timed { requested, replied, value } = self.report()?;
+        let report = self.report();
+        if report.is_err() && self.line.is_open() {
+            // It may hear what it does not answer.
+            self.line.send(&[protocol::JOG_CANCEL])?;
+        }
+        let Timed { requested, replied, value } = report?;
         self.last_steps = value.steps;
         let position = LensPosition(value.steps);
         if let Err(what) = self.continuity.check(replied, position) {

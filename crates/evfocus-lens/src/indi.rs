@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::continuity::Continuity;
@@ -26,6 +26,9 @@ pub const PORT: u16 = 7624;
 const PERIODS: u32 = 3;
 /// An update this soon after a command may still be about the command before.
 const STALE: Duration = Duration::from_millis(300);
+/// So many updates are a stream; one that ceases for this long, and for three times its longest gap, has been cut off.
+const STREAM: u32 = 3;
+const CEASED: Duration = Duration::from_millis(60);
 /// A focuser at rest this near to its target has arrived.
 const ARRIVED: f64 = 1.5;
 /// What a motion may take beyond twice its way by speed: some drivers say nothing before its end.
@@ -63,8 +66,43 @@ pub struct IndiConfig {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Motion {
     Rest,
-    Going { target: f64, since: HostMicros, until: HostMicros },
-    Stopping { since: HostMicros },
+    /// With the updates since then.
+    Going {
+        target: f64,
+        since: HostMicros,
+        until: HostMicros,
+        stream: Stream,
+    },
+    /// It was at `seen` since `changed`: many say that they rest as soon as they are told to.
+    Stopping {
+        since: HostMicros,
+        seen: f64,
+        changed: HostMicros,
+    },
+}
+
+/// The updates of a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Stream {
+    updates: u32,
+    last: Option<HostMicros>,
+    longest_gap: Duration,
+}
+
+impl Stream {
+    fn note(&mut self, time: HostMicros) {
+        if let Some(last) = self.last.filter(|last| time > *last) {
+            self.longest_gap = self.longest_gap.max(time.since(last));
+            self.updates += 1;
+        }
+        self.last = Some(time);
+    }
+
+    /// Whether updates came regularly, and have ceased. Some servers say nothing before the end of a motion; for those this is never so.
+    fn has_ceased(&self, now: HostMicros) -> bool {
+        let longest = CEASED.max(3 * self.longest_gap);
+        self.updates >= STREAM && self.last.is_some_and(|last| now.since(last) >= longest)
+    }
 }
 
 /// A focuser behind an INDI server.
@@ -100,7 +138,8 @@ impl Indi {
     }
 
     fn abort(&mut self) -> Result<(), DeviceError> {
-        self.motion = Motion::Stopping { since: self.session.line.now() };
+        let since = self.session.line.now();
+        self.motion = Motion::Stopping { since, seen: self.session.position.steps, changed: since };
         self.session.set("FOCUS_ABORT_MOTION", Kind::Switch, "ABORT", "On")
     }
 
@@ -114,8 +153,12 @@ impl Indi {
         let state = update.state;
         match self.motion {
             Motion::Rest => Ok(state == State::Busy),
-            Motion::Going { target, since, until } => {
+            Motion::Going { target, since, until, mut stream } => {
                 let is_news = update.time > since;
+                if is_news {
+                    stream.note(update.time);
+                }
+                self.motion = Motion::Going { target, since, until, stream };
                 let is_there = (update.steps - target).abs() <= ARRIVED;
                 if is_news && state == State::Alert {
                     self.motion = Motion::Rest;
@@ -127,6 +170,15 @@ impl Indi {
                     self.motion = Motion::Rest;
                     return Ok(false);
                 }
+                if state == State::Busy && stream.has_ceased(now) {
+                    let what = format!(
+                        "has said nothing for {:?} on its way to {target}, at {} last; it was told to stop. Is the server still there?",
+                        now.since(update.time),
+                        update.steps
+                    );
+                    self.abort()?;
+                    return Err(self.session.line.error(DeviceErrorKind::TimedOut, what));
+                }
                 if now > until {
                     self.motion = Motion::Rest;
                     let what = format!(
@@ -137,12 +189,14 @@ impl Indi {
                 }
                 Ok(true)
             }
-            Motion::Stopping { since } => {
+            Motion::Stopping { since, seen, changed } => {
                 let is_news = update.time > since || now > since + STALE;
-                let has_stopped = is_news && state != State::Busy;
-                if has_stopped {
-                    self.motion = Motion::Rest;
-                }
+                let has_moved = (update.steps - seen).abs() >= 0.5;
+                let changed = if has_moved { now } else { changed };
+                let stands = now.since(changed) >= self.config.polling.mul_f64(1.5);
+                let has_stopped = is_news && state != State::Busy && stands;
+                let stopping = Motion::Stopping { since, seen: update.steps, changed };
+                self.motion = if has_stopped { Motion::Rest } else { stopping };
                 Ok(!has_stopped)
             }
         }
@@ -153,9 +207,11 @@ impl Lens for Indi {
     fn info(&self) -> LensInfo {
         LensInfo {
             model: self.config.device.clone(),
+            class: LensClass::Positioner,
             serial: format!("INDI {}", self.session.line.place()),
             range: self.range,
             max_speed: self.config.max_speed,
+            speed_is_share: self.config.set_speed,
             needs_homing: false,
         }
     }
@@ -179,7 +235,7 @@ impl Lens for Indi {
             2.0 * (target - self.session.position.steps).abs()
                 / (share * self.config.max_speed.counts_per_second()),
         );
-        self.motion = Motion::Going { target, since, until: since + way + SLACK };
+        self.motion = Motion::Going { target, since, until: since + way + SLACK, stream: Stream::default() };
         let position = target.to_string();
         self.session.set("ABS_FOCUS_POSITION", Kind::Number, "FOCUS_ABSOLUTE_POSITION", &position)
     }

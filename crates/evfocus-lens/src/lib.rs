@@ -16,6 +16,7 @@ mod line;
 pub mod moonlite;
 pub mod optotune;
 mod port;
+mod probe;
 mod rate_drive;
 
 pub use firmata::Firmata;
@@ -25,3 +26,4 @@ pub use labjack::LabJack;
 pub use moonlite::MoonLite;
 pub use optotune::Optotune;
 pub use port::{Port, UsbPort, usb_ports};
+pub use probe::{Answered, ask_all, probe};

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::continuity::Continuity;
@@ -25,6 +25,8 @@ pub const BAUD: u32 = 9600;
 
 /// Question and answer take 10 ms; a firmware that steps in its main loop may be as late as this.
 const USUAL: Patience = Patience { timeout: Duration::from_millis(300), attempts: 3 };
+/// A motor whose controller is silent is stopped within 100 ms; question and answer take 10.
+const MOVING: Patience = Patience { timeout: Duration::from_millis(35), attempts: 2 };
 /// Opening the port resets an Arduino, which is deaf for up to 2 s.
 const BOOTING: Patience = Patience { timeout: Duration::from_secs(1), attempts: 3 };
 /// A motor that has stood for this long away from its target, and says that it does not move, has been stopped.
@@ -58,8 +60,10 @@ pub struct MoonLite {
     line: Line,
     config: MoonLiteConfig,
     motion: Motion,
-    /// The target that the controller must remember.
+    /// The target that the controller must remember, or one between it and where the motor was seen last, if it was stopped.
     told: Option<u32>,
+    /// Where the motor was seen last.
+    seen: u32,
     /// Whether an answer was missed, so that the controller may have been reset meanwhile.
     in_doubt: bool,
     continuity: Continuity,
@@ -76,6 +80,7 @@ impl MoonLite {
             config,
             motion: Motion::Rest,
             told: None,
+            seen: 0,
             in_doubt: false,
             continuity: Continuity::new(config.range, config.max_speed),
         };
@@ -109,12 +114,16 @@ impl MoonLite {
         Ok(())
     }
 
+    fn patience(&self) -> Patience {
+        if self.motion == Motion::Rest { USUAL } else { MOVING }
+    }
+
     fn position(&mut self) -> Result<Timed<u32>, DeviceError> {
-        self.line.ask(&Command::Position.encode(), USUAL, protocol::position)
+        self.line.ask(&Command::Position.encode(), self.patience(), protocol::position)
     }
 
     fn says_moving(&mut self) -> Result<bool, DeviceError> {
-        Ok(self.line.ask(&Command::IsMoving.encode(), USUAL, protocol::is_moving)?.value)
+        Ok(self.line.ask(&Command::IsMoving.encode(), self.patience(), protocol::is_moving)?.value)
     }
 
     /// Whether the motor, now at `position`, is still on its way. Firmwares that step in a timer may say "not moving" right
@@ -147,10 +156,13 @@ impl MoonLite {
         }
     }
 
-    /// After a reset the count begins anew, which no answer tells; but the target is forgotten too.
+    /// After a reset the count begins anew, which no answer tells; but the target is forgotten too. One that was stopped since has its
+    /// target on the way to the one it was told.
     fn check_memory(&mut self) -> Result<(), DeviceError> {
         let heard = self.line.ask(&Command::Target.encode(), USUAL, protocol::position)?.value;
-        match self.told.take_if(|told| *told != heard) {
+        let seen = self.seen;
+        let is_on_the_way = |told: u32| (seen.min(told)..=seen.max(told)).contains(&heard);
+        match self.told.take_if(|told| !is_on_the_way(*told)) {
             None => Ok(()),
             Some(told) => {
                 let what = format!(
@@ -183,6 +195,7 @@ impl MoonLite {
             self.check_memory()?;
         }
         let Timed { requested, replied, value } = self.position()?;
+        self.seen = value;
         let position = LensPosition(f64::from(value));
         if let Err(what) = self.continuity.check(replied, position) {
             return Err(self.line.error(DeviceErrorKind::Fault, what));
@@ -196,9 +209,11 @@ impl Lens for MoonLite {
     fn info(&self) -> LensInfo {
         LensInfo {
             model: "MoonLite focuser".to_owned(),
+            class: LensClass::Positioner,
             serial: self.line.place().to_owned(),
             range: self.config.range,
             max_speed: self.config.max_speed,
+            speed_is_share: true,
             needs_homing: false,
         }
     }
@@ -223,13 +238,21 @@ impl Lens for MoonLite {
 
     fn stop(&mut self) -> Result<(), DeviceError> {
         self.ready()?;
-        (self.motion, self.told) = (Motion::Stopping { seen: None }, None);
+        self.motion = Motion::Stopping { seen: None };
+        if !self.in_doubt {
+            self.told = None;
+        }
         self.line.send(&Command::Stop.encode())
     }
 
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         let sample = self.ready().and_then(|()| self.look());
         self.in_doubt = sample.is_err();
+        if sample.is_err() && self.motion != Motion::Rest && self.line.is_open() {
+            // It may hear what it does not answer.
+            self.motion = Motion::Stopping { seen: None };
+            self.line.send(&Command::Stop.encode())?;
+        }
         sample
     }
 }

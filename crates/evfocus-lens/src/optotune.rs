@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::line::{Line, Patience};
@@ -33,6 +33,8 @@ const USUAL: Patience = Patience { timeout: Duration::from_millis(100), attempts
 const GREETING: Patience = Patience { timeout: Duration::from_millis(500), attempts: 3 };
 /// However seldom the samples come, a step is no longer than the way of this time.
 const LONGEST_STEP: Duration = Duration::from_millis(20);
+/// How often a set-point is read back while the staircase goes on: each takes time in which no step can leave.
+const CHECK: Duration = Duration::from_millis(25);
 /// The glass has settled when it is this near to its rest, counts,
 const SETTLED: f64 = 1.0;
 /// and this slow, counts per second.
@@ -81,6 +83,8 @@ pub struct Optotune {
     /// The set-point before.
     before: i16,
     sweep: Option<Sweep>,
+    /// When the set-point was read back last.
+    checked: HostMicros,
     response: Response,
 }
 
@@ -94,7 +98,8 @@ impl Optotune {
         let mut line = Line::new("Optotune Lens Driver", port, clock);
         let Greeting { serial, range, set_point } = greet(&mut line, config.quantity)?;
         let response = Response::new(config.response, line.now(), f64::from(set_point));
-        Ok(Self { line, config, serial, range, set_point, before: set_point, sweep: None, response })
+        let checked = line.now();
+        Ok(Self { line, config, serial, range, set_point, before: set_point, sweep: None, checked, response })
     }
 
     fn ready(&mut self) -> Result<(), DeviceError> {
@@ -213,9 +218,11 @@ impl Lens for Optotune {
     fn info(&self) -> LensInfo {
         LensInfo {
             model: "Optotune Lens Driver".to_owned(),
+            class: LensClass::Setpoint,
             serial: self.serial.clone(),
             range: self.range,
             max_speed: self.config.max_speed,
+            speed_is_share: false,
             needs_homing: false,
         }
     }
@@ -241,7 +248,10 @@ impl Lens for Optotune {
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         self.ready()?;
         self.step()?;
-        self.check()?;
+        if self.sweep.is_none() || self.line.now().since(self.checked) >= CHECK {
+            self.check()?;
+            self.checked = self.line.now();
+        }
         let now = self.line.now();
         let (position, velocity) = self.response.at(now);
         let is_settled =

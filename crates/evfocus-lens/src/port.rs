@@ -1,7 +1,7 @@
 //! Where a lens is attached.
 
 mod list;
-mod serial;
+pub(crate) mod serial;
 mod tcp;
 
 use std::fmt;

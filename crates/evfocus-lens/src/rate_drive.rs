@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use evfocus_core::{LensPosition, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, LensInfo};
+use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, LensClass, LensInfo};
 
 use crate::Port;
 use crate::continuity::Continuity;
@@ -78,9 +78,11 @@ impl RateDrive {
         let DriveConfig { range, max_speed, .. } = *self.drive.config();
         LensInfo {
             model: self.model.to_owned(),
+            class: LensClass::RateDrive,
             serial: serial.to_owned(),
             range,
             max_speed,
+            speed_is_share: false,
             needs_homing: false,
         }
     }

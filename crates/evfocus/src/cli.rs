@@ -3,8 +3,8 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
-    abort, analyze, completions, demo, devices, doctor, eval, focus, info, man, measure, mode, move_lens,
-    reload, report, simulate, status, watch,
+    abort, analyze, calibrate, completions, demo, devices, doctor, eval, focus, info, man, measure, mode,
+    move_lens, reload, report, simulate, status, watch,
 };
 use crate::exit::Exit;
 
@@ -36,6 +36,7 @@ enum Command {
     Watch(watch::Arguments),
     Move(move_lens::Arguments),
     Mode(mode::Arguments),
+    Calibrate(calibrate::Arguments),
     Devices(devices::Arguments),
     Doctor(doctor::Arguments),
     Report(report::Arguments),
@@ -61,6 +62,7 @@ impl Cli {
             Command::Watch(arguments) => watch::run(&arguments),
             Command::Move(arguments) => move_lens::run(&arguments),
             Command::Mode(arguments) => mode::run(&arguments),
+            Command::Calibrate(arguments) => calibrate::run(&arguments),
             Command::Devices(arguments) => devices::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),

@@ -2,6 +2,7 @@
 
 pub mod abort;
 pub mod analyze;
+pub mod calibrate;
 pub mod completions;
 pub mod demo;
 pub mod devices;

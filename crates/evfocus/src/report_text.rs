@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use evfocus_ipc::{Report, RigDelay, State, Sweep, WindowAnswer};
+use evfocus_ipc::{Calibration, Report, RigDelay, State, Sweep, WindowAnswer};
 
 use crate::output::Output;
 use crate::quantity::{answer, count, half_difference, rate};
@@ -70,6 +70,9 @@ pub(crate) fn print(report: &Report, out: &mut Output) -> anyhow::Result<()> {
             "delay of the pixels  {base:.1} ms and {slope:.1} ms for each Hz of their noise, {learnt}"
         )?;
     }
+    if let Some(known) = &report.calibration {
+        writeln!(out, "measured of the lens  {}", calibration(known))?;
+    }
     let events = &report.events;
     writeln!(
         out,
@@ -102,6 +105,47 @@ pub(crate) fn print_windows(windows: &[WindowAnswer], out: &mut Output) -> anyho
             (None, message) => format!("no answer: {}", message.as_deref().unwrap_or("unknown")),
         };
         writeln!(out, "window {number}: {answer}")?;
+    }
+    Ok(())
+}
+
+/// What was measured of a lens, in a line.
+pub(crate) fn calibration(known: &Calibration) -> String {
+    format!(
+        "{:.0} counts/s, {}, {:.0} positions/s, obeys after {:.0} ms",
+        known.speed_counts_per_s,
+        play(known),
+        known.read_back_hz,
+        known.command_latency_us * 1e-3
+    )
+}
+
+fn play(known: &Calibration) -> String {
+    match (known.backlash, known.backlash_error_bar) {
+        (Some(counts), Some(error_bar)) => format!("play {counts:.1} ± {error_bar:.1} counts"),
+        (Some(counts), None) => format!("play {counts:.1} counts"),
+        (None, _) => String::from("play unknown"),
+    }
+}
+
+/// Everything that was measured of a lens.
+pub(crate) fn print_calibration(known: &Calibration, out: &mut Output) -> anyhow::Result<()> {
+    let millis = |micros: f64| micros * 1e-3;
+    writeln!(out, "lens         {}", known.lens)?;
+    writeln!(out, "range        {:.1} to {:.1} counts", known.range.min, known.range.max)?;
+    writeln!(out, "speed        {:.1} counts/s", known.speed_counts_per_s)?;
+    writeln!(
+        out,
+        "positions    {:.0} a second, {:.1} ms from question to answer, noise {:.2} counts",
+        known.read_back_hz,
+        millis(known.read_back_us),
+        known.read_noise
+    )?;
+    writeln!(out, "obeys after  {:.1} ms", millis(known.command_latency_us))?;
+    writeln!(out, "stops in     {:.0} ms, {:.1} counts", millis(known.stop_us), known.stop_counts)?;
+    writeln!(out, "             {}", play(known))?;
+    if let Some(lag_us) = known.lag_us {
+        writeln!(out, "             pixels and positions {:.1} ms late", millis(lag_us))?;
     }
     Ok(())
 }

@@ -14,8 +14,10 @@ use std::time::Duration;
 
 use evfocus_core::LensPosition;
 use evfocus_core::controller::{FocusRequest, Mode, Refusal};
+use evfocus_ipc::Calibration;
 use serde::Deserialize;
 
+use crate::calibration;
 use crate::reports::Kept;
 
 pub use access::AccessSection;
@@ -97,8 +99,8 @@ pub struct Config {
     pub lens: LensBackend,
     /// How often the lens is asked where it is.
     pub lens_poll: Duration,
-    /// Play between what the lens reports and the glass, counts.
-    pub lens_backlash: f64,
+    /// Play between what the lens reports and the glass, counts; nothing: as it was calibrated.
+    pub lens_backlash: Option<f64>,
     /// The positions the lens may be sent to, where they are narrower than its own.
     pub lens_min: Option<LensPosition>,
     /// See [`lens_min`](Self::lens_min).
@@ -210,7 +212,9 @@ impl Config {
             real_time: file.real_time.check()?,
             metrics: file.metrics.check()?,
             lens_poll: BadValue::duration("lens.poll_ms", file.lens.poll_ms, 1e-3, 0.5, 1000.0)?,
-            lens_backlash: BadValue::check("lens.backlash_counts", file.lens.backlash_counts, 0.0, 1e6)?,
+            lens_backlash: (file.lens.backlash_counts)
+                .map(|play| BadValue::check("lens.backlash_counts", play, 0.0, 1e6))
+                .transpose()?,
             camera: file.camera.camera()?,
             lens_min: file.lens.min_counts.map(LensPosition),
             lens_max: file.lens.max_counts.map(LensPosition),
@@ -221,7 +225,7 @@ impl Config {
         // Against the lens, where it is known without asking it, and the default run against both: now rather than at the
         // first run.
         if let Some(lens) = config.lens.expected(&config.rig) {
-            let controller = config.controller(&lens)?;
+            let controller = config.controller(&lens, None)?;
             let geometry = config.camera.geometry(config.rig.sensor.geometry);
             FocusRequest::default().resolve(&controller, geometry).map_err(|refusal| {
                 let is_interval = matches!(refusal, Refusal::Interval { .. });
@@ -238,18 +242,26 @@ impl Config {
         Kept { newest: self.reports_kept, age }
     }
 
-    /// The controller's settings for `lens`.
+    /// The controller's settings for `lens`, of which `calibration` is known.
     pub(crate) fn controller(
         &self,
         lens: &evfocus_hal::LensInfo,
+        calibration: Option<&Calibration>,
     ) -> Result<evfocus_core::ControllerConfig, BadValue> {
-        let mut controller = self.focus.controller(lens, self.lens_min, self.lens_max)?;
+        if let Some(longest) = lens.class.longest_poll().filter(|longest| self.lens_poll > *longest) {
+            let remedy = format!("a {} lens moves with each poll; at most {longest:?}", lens.class.name());
+            return Err(BadValue::new("lens.poll_ms", self.lens_poll.as_secs_f64() * 1e3, remedy));
+        }
+        let controller = self.focus.controller(lens, self.lens_min, self.lens_max)?;
+        let mut controller = calibration::apply(calibration, controller, lens.speed_is_share);
         // Room for a position at every poll of the longest sweep, and for the rests around it.
         let polls = controller.capacity.longest.as_secs_f64() / self.lens_poll.as_secs_f64();
-        controller.backlash = self.lens_backlash;
+        // What somebody has written down counts before what was measured.
+        let measured = calibration.and_then(|known| known.backlash);
+        controller.backlash = self.lens_backlash.or(measured).unwrap_or(0.0);
         if self.focus.approach_margin_counts.is_none() {
             // The last approach must take the play up.
-            controller.approach_margin = controller.approach_margin.max(2.0 * self.lens_backlash);
+            controller.approach_margin = controller.approach_margin.max(2.0 * controller.backlash);
         }
         controller.lens_samples = polls as usize * 2 + 1_000;
         Ok(controller)

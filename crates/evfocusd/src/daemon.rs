@@ -16,6 +16,7 @@ use tokio::sync::{broadcast, mpsc, watch};
 use tokio::task::JoinSet;
 
 use crate::access::Access;
+use crate::calibration::{CalibrationFile, Desk};
 use crate::config::{CameraConfig, Config};
 use crate::device_list::DeviceList;
 use crate::devices::{self, Devices};
@@ -29,7 +30,7 @@ use crate::rig_delay::RigDelayFile;
 use crate::service;
 use crate::supervisor::{self, Supervisor};
 use crate::threads::camera::{BATCH_EVENTS, BATCHES, CameraThread};
-use crate::threads::control::{CURVE_POINTS, ControlThread, Publications, REPORTS};
+use crate::threads::control::{CURVE_POINTS, ControlThread, Publications, REPORTS, Seen};
 use crate::threads::lens::{LensThread, SAMPLES};
 use crate::threads::orders::orders;
 use crate::threads::{NOTICES, StopFlag};
@@ -124,7 +125,7 @@ impl Running {
         clock: &Arc<dyn Clock>,
     ) -> anyhow::Result<Self> {
         let (camera_info, lens_info) = (devices.camera.info(), devices.lens.info());
-        let Prepared { controller, access, store, rig_delay, run_devices } =
+        let Prepared { controller, access, store, rig_delay, run_devices, calibration, calibration_file, desk } =
             Prepared::new(config, &camera_info, &lens_info, clock)?;
         let ControllerConfig { delays: saved_delays, pace, limits, .. } = *controller.config();
 
@@ -138,7 +139,9 @@ impl Running {
         let (orders_in, orders_out) = orders();
         let (commands_in, commands_out) = mpsc::channel(COMMANDS);
         let (reports_in, reports_out) = mpsc::channel(REPORTS);
-        let (snapshots_in, snapshots_out) = watch::channel(controller.snapshot());
+        let (calibrations_in, calibrations_out) = mpsc::channel(1);
+        let (seen_in, seen_out) =
+            watch::channel(Seen { snapshot: controller.snapshot(), calibrating: false, limits });
         let (status_in, status_out) = watch::channel(Arc::new(Status::default()));
         let (progress_in, _) = broadcast::channel(PROGRESS);
 
@@ -160,7 +163,14 @@ impl Running {
             orders: orders_in,
             new_settings: None,
             vitals: vitals.clone(),
-            publications: Publications { snapshots: snapshots_in, curve: curve_in, reports: reports_in },
+            publications: Publications {
+                seen: seen_in,
+                curve: curve_in,
+                reports: reports_in,
+                calibrations: calibrations_in,
+            },
+            desk,
+            calibration_asked: None,
             stop: stop.clone(),
         };
         let control = spawn("evfocus-control", &ended_in, control_wish, move || control.run())?;
@@ -198,7 +208,10 @@ impl Running {
         let followers = progress_in.downgrade();
         let metrics = Metrics::new(vitals.clone());
         let publisher = Publisher {
-            snapshots: snapshots_out,
+            seen: seen_out,
+            calibrations: calibrations_out,
+            calibration,
+            calibration_file,
             curve: curve_out,
             reports: reports_out,
             status: status_in,
@@ -208,7 +221,7 @@ impl Running {
             metrics: metrics.clone(),
             grants,
             saved_delays,
-            constants: Constants { devices: run_devices, limits },
+            constants: Constants { devices: run_devices },
             clock: Arc::clone(clock),
         };
         Ok(Self {
@@ -288,6 +301,9 @@ struct Prepared {
     store: Reports,
     rig_delay: Option<RigDelayFile>,
     run_devices: ipc::RunDevices,
+    calibration: Option<ipc::Calibration>,
+    calibration_file: Option<CalibrationFile>,
+    desk: Desk,
 }
 
 impl Prepared {
@@ -298,9 +314,6 @@ impl Prepared {
         clock: &Arc<dyn Clock>,
     ) -> anyhow::Result<Self> {
         let access = watch::Sender::new(Arc::new(Access::of(&config.access)?));
-        let mut settings = config
-            .controller(lens)
-            .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
         let store = Reports::new(ReportStore::open(&config.state_dir, config.kept()));
         if let Some(fault) = store.fault() {
             tracing::error!(%fault, "reports are kept in memory only");
@@ -309,6 +322,13 @@ impl Prepared {
         // Where another daemon keeps its reports, it keeps its delay too.
         let rig_delay = (store.fault().is_none())
             .then(|| RigDelayFile::new(&config.state_dir, &run_devices.camera, &run_devices.lens));
+        let calibration_file =
+            (store.fault().is_none()).then(|| CalibrationFile::new(&config.state_dir, &run_devices.lens));
+        let calibration = calibration_file.as_ref().and_then(CalibrationFile::read);
+        let desk = Desk::new(config.clone(), lens.clone(), calibration.clone());
+        let mut settings = desk
+            .settings()
+            .map_err(|bad| anyhow::anyhow!("the configuration does not suit the lens: {bad}"))?;
         settings.delays = rig_delay.as_ref().and_then(RigDelayFile::read).unwrap_or_default();
         let mut controller = Controller::new(settings, camera.geometry, clock.now());
         controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
@@ -316,7 +336,7 @@ impl Prepared {
             // An idle controller refuses no change of mode and has nothing to do for it.
             controller.command(CoreCommand::SetMode(Mode::Manual), clock.now(), &mut Vec::new())?;
         }
-        Ok(Self { controller, access, store, rig_delay, run_devices })
+        Ok(Self { controller, access, store, rig_delay, run_devices, calibration, calibration_file, desk })
     }
 }
 
@@ -362,9 +382,9 @@ struct DaemonLookups {
 }
 
 impl Lookups for DaemonLookups {
-    fn devices(&self) -> Result<Vec<Device>, Error> {
+    fn devices(&self, probe: Option<&[String]>) -> Result<Vec<Device>, Error> {
         let status = Arc::clone(&self.status.borrow());
-        Ok(self.devices.list(&status))
+        Ok(self.devices.list(&status, probe))
     }
 
     fn report(&self, id: Option<u64>) -> Result<Report, Error> {

@@ -5,7 +5,7 @@ use evfocus_hal::{CameraInfo, LensInfo};
 use evfocus_ipc::{Device, DeviceRole, DeviceState, Status};
 
 use crate::config::{Config, LensBackend};
-use crate::devices;
+use crate::serial_ports;
 
 /// Driver and location of a camera that the simulated rig stands in for.
 const SIMULATED: &str = "simulated";
@@ -27,8 +27,9 @@ impl DeviceList {
         Self { camera_driver: config.camera.driver(), camera, lens_backend, lens }
     }
 
-    /// The devices in use and those that are attached. Asks the attached ones, which may take its time.
-    pub(crate) fn list(&self, status: &Status) -> Vec<Device> {
+    /// The devices in use and those that are attached. Asks the attached ones, which may take its time; what answers on the serial
+    /// ports of `probe`, or on those on USB if it is empty, only if it is there.
+    pub(crate) fn list(&self, status: &Status, probe: Option<&[String]>) -> Vec<Device> {
         let mut attached = attached();
         let location = match self.camera_driver {
             None => Some(SIMULATED.to_owned()),
@@ -55,7 +56,7 @@ impl DeviceList {
             state: state(lens_is_there),
             message: message(lens_is_there),
         };
-        let ports = devices::free_ports(self.lens_backend.location());
+        let ports = serial_ports::free(self.lens_backend.location(), probe);
         [camera, lens].into_iter().chain(attached.into_iter().map(device)).chain(ports).collect()
     }
 }

@@ -1,6 +1,5 @@
 //! What the focus loop needs of its devices beyond the traits: opening them, and telling their failures apart.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use evfocus_camera::davis346::Davis346;
@@ -9,9 +8,7 @@ use evfocus_camera::usb::{self, NusbTransport};
 use evfocus_camera::{Driver, ReopeningCamera};
 use evfocus_core::controller::{Action, DeviceFailure};
 use evfocus_hal::{Camera, Clock, DeviceError, DeviceErrorKind, Lens};
-use evfocus_ipc::{Device, DeviceRole, DeviceState};
-use evfocus_lens::{Firmata, Grbl, Indi, LabJack, MoonLite, Optotune, Port, UsbPort};
-use rustix::fs::Access;
+use evfocus_lens::{Firmata, Grbl, Indi, LabJack, MoonLite, Optotune, Port};
 
 use crate::config::{CameraConfig, Config, LensBackend, LensDriver, LensPlace};
 
@@ -82,7 +79,18 @@ pub(crate) fn open_lens(
         LensPlace::Serial { path, baud } => Port::serial(path, *baud, Arc::clone(clock)),
         LensPlace::Tcp(address) => Port::tcp(address, Arc::clone(clock)),
     };
-    let clock = Arc::clone(clock);
+    open_driver(driver, port, Arc::clone(clock))
+}
+
+/// Opens the lens at `port` with `driver`.
+///
+/// # Errors
+/// What keeps it from being opened.
+pub fn open_driver(
+    driver: &LensDriver,
+    port: Port,
+    clock: Arc<dyn Clock>,
+) -> Result<Box<dyn Lens>, DeviceError> {
     Ok(match driver {
         LensDriver::MoonLite(config) => Box::new(MoonLite::open(port, *config, clock)?),
         LensDriver::Optotune(config) => Box::new(Optotune::open(port, *config, clock)?),
@@ -91,27 +99,6 @@ pub(crate) fn open_lens(
         LensDriver::LabJack(config) => Box::new(LabJack::open(port, *config, clock)?),
         LensDriver::Indi(config) => Box::new(Indi::open(port, config.clone(), clock)?),
     })
-}
-
-/// The serial ports on USB that a lens could be attached to, besides the one that is used.
-pub(crate) fn free_ports(used: &str) -> Vec<Device> {
-    let used = std::fs::canonicalize(used).unwrap_or_default();
-    let free = evfocus_lens::usb_ports().into_iter().filter(|port| Path::new(&port.path) != used);
-    let devices = free.map(|UsbPort { path, product, serial }| {
-        let may = rustix::fs::access(&path, Access::READ_OK | Access::WRITE_OK).is_ok();
-        let remedy =
-            "let the user that evfocusd runs as into the group that owns the port, dialout on Debian";
-        Device {
-            role: DeviceRole::Lens,
-            driver: "serial port".to_owned(),
-            model: product,
-            serial,
-            location: path,
-            state: if may { DeviceState::Available } else { DeviceState::PermissionDenied },
-            message: (!may).then(|| remedy.to_owned()),
-        }
-    });
-    devices.collect()
 }
 
 /// Opens the camera of `driver` with `serial`, or the only one; and the same one again whenever it comes back.

@@ -5,17 +5,18 @@
 
 use std::sync::Arc;
 
-use evfocus_core::ControllerConfig;
 pub use evfocus_ipc::client::Reloaded;
-use evfocus_ipc::{Device, Error, FocusRequest, Mode, Progress, Report, Status};
+use evfocus_ipc::{Calibration, Device, Error, FocusRequest, Mode, Progress, Report, Status};
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
 use crate::access::Access;
+use crate::config::Config;
 
 /// The answer to a command.
 pub type Answer<Value> = oneshot::Sender<Result<Value, Error>>;
 
-/// What the control thread is asked to do. It answers at once; it never waits for a motion or a run to end.
+/// What the control thread is asked to do. It answers at once, but for a calibration; it never waits for a motion or a run
+/// to end.
 #[derive(Debug)]
 pub enum Command {
     /// Start a run, or follow the one under way.
@@ -37,6 +38,11 @@ pub enum Command {
         /// Accepted, not arrived.
         answer: Answer<()>,
     },
+    /// Measure the lens. Answered when it is done, which takes a while.
+    Calibrate {
+        /// What was measured.
+        answer: Answer<Calibration>,
+    },
     /// Change the mode.
     SetMode {
         /// The new mode.
@@ -46,15 +52,15 @@ pub enum Command {
     },
     /// Change the settings; they hold once no run is under way.
     Configure {
-        /// The new settings.
-        settings: Box<ControllerConfig>,
+        /// The configuration that they are made of.
+        config: Box<Config>,
     },
 }
 
 /// What is looked up, or done, away from the task that serves clients. These may take their time: they run on a thread of their own.
 pub trait Lookups: Send + Sync + 'static {
-    /// The devices in use, attached or configured.
-    fn devices(&self) -> Result<Vec<Device>, Error>;
+    /// The devices in use, attached or configured; what answers on the serial ports `probe` (empty: those on USB) is asked.
+    fn devices(&self, probe: Option<&[String]>) -> Result<Vec<Device>, Error>;
 
     /// The report of run `id`, or of the last one that has one.
     fn report(&self, id: Option<u64>) -> Result<Report, Error>;

@@ -4,6 +4,7 @@
 
 pub mod access;
 pub mod arguments;
+pub mod calibration;
 pub mod config;
 pub mod daemon;
 mod device_list;
@@ -18,6 +19,7 @@ mod real_time;
 pub mod reload;
 mod reports;
 mod rig_delay;
+mod serial_ports;
 pub mod service;
 mod storage;
 pub mod supervisor;

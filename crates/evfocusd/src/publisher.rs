@@ -4,17 +4,18 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::controller::Snapshot;
-use evfocus_core::{CurvePoint, DelayModel, LensRange, RunId};
+use evfocus_core::{CurvePoint, DelayModel, RunId};
 use evfocus_hal::{Clock, unix_time};
 use evfocus_ipc::{self as ipc, Progress, Report, Status};
 use rtrb::Consumer;
 use tokio::sync::{broadcast, mpsc, watch};
 
+use crate::calibration::CalibrationFile;
 use crate::metrics::Metrics;
 use crate::real_time::Grants;
 use crate::reports::Reports;
 use crate::rig_delay::RigDelayFile;
-use crate::threads::control::EndedRun;
+use crate::threads::control::{Calibrated, EndedRun, Seen};
 use crate::wire;
 
 /// Messages of a run that a follower may be behind: a sweep of 20 s at 50 points a second.
@@ -25,18 +26,22 @@ pub(crate) const PROGRESS: usize = 1_024;
 pub(crate) struct Constants {
     /// The devices.
     pub(crate) devices: ipc::RunDevices,
-    /// Where the lens may go.
-    pub(crate) limits: LensRange,
 }
 
 /// The task on the socket's side.
 pub(crate) struct Publisher {
     /// From the control thread.
-    pub(crate) snapshots: watch::Receiver<Snapshot>,
+    pub(crate) seen: watch::Receiver<Seen>,
     /// From the control thread.
     pub(crate) curve: Consumer<(RunId, CurvePoint)>,
     /// From the control thread.
     pub(crate) reports: mpsc::Receiver<Box<EndedRun>>,
+    /// From the control thread.
+    pub(crate) calibrations: mpsc::Receiver<Calibrated>,
+    /// What was measured of the lens.
+    pub(crate) calibration: Option<ipc::Calibration>,
+    /// To the disk; nothing if the state directory cannot be used.
+    pub(crate) calibration_file: Option<CalibrationFile>,
     /// To the clients.
     pub(crate) status: watch::Sender<Arc<Status>>,
     /// To the clients.
@@ -78,13 +83,14 @@ impl Publisher {
         };
         loop {
             tokio::select! {
-                changed = self.snapshots.changed() => {
+                changed = self.seen.changed() => {
                     if changed.is_err() {
                         break;
                     }
                     self.publish_snapshot(&news);
                 }
                 Some(run) = self.reports.recv() => self.publish_report(&run, &mut news).await,
+                Some(calibrated) = self.calibrations.recv() => self.keep_calibration(calibrated, &mut news).await,
             }
         }
         while let Some(run) = self.reports.recv().await {
@@ -93,7 +99,8 @@ impl Publisher {
     }
 
     fn publish_snapshot(&mut self, news: &News) {
-        let snapshot = *self.snapshots.borrow_and_update();
+        let seen = *self.seen.borrow_and_update();
+        let snapshot = seen.snapshot;
         self.metrics.observe(&snapshot);
         let curve_points = self.send_curve(&snapshot);
         if let Some(run) = snapshot.run
@@ -101,17 +108,19 @@ impl Publisher {
         {
             self.send(progress(run, &snapshot, None));
         }
-        self.status.send_replace(Arc::new(self.status(&snapshot, news)));
+        self.status.send_replace(Arc::new(self.status(&seen, news)));
     }
 
     async fn publish_report(&mut self, ended: &EndedRun, news: &mut News) {
-        let snapshot = *self.snapshots.borrow();
+        let seen = *self.seen.borrow();
+        let snapshot = seen.snapshot;
         self.send_curve(&snapshot);
         let circumstances = wire::Circumstances {
             started_unix_s: unix_time()
                 .saturating_sub(self.clock.now().since(ended.report.started))
                 .as_secs_f64(),
             devices: self.constants.devices.clone(),
+            calibration: self.calibration.clone(),
         };
         let report = Arc::new(wire::report(ended, circumstances));
         log(&report);
@@ -120,7 +129,7 @@ impl Publisher {
         let delay_fault = self.keep_delays(ended.delays).await;
         news.fault = fault.or(delay_fault);
         news.last_run = Some(last_run(&report));
-        self.status.send_replace(Arc::new(self.status(&snapshot, news)));
+        self.status.send_replace(Arc::new(self.status(&seen, news)));
         let report = Some(Report::clone(&report));
         self.send(Progress { done: true, report, ..progress(ended.report.id, &snapshot, None) });
     }
@@ -140,6 +149,34 @@ impl Publisher {
         Some(format!("the learnt delay of the pixels is kept in memory only: {error}"))
     }
 
+    /// Dates what was measured of the lens, writes it, and tells whoever asked for it.
+    async fn keep_calibration(&mut self, calibrated: Calibrated, news: &mut News) {
+        let Calibrated { mut calibration, answer } = calibrated;
+        calibration.measured_unix_s = unix_time().as_secs_f64();
+        self.calibration = Some(calibration.clone());
+        let error = match self.calibration_file.clone() {
+            None => self.store.fault(),
+            Some(file) => {
+                let written = calibration.clone();
+                match tokio::task::spawn_blocking(move || file.write(&written)).await {
+                    Ok(Ok(())) => None,
+                    Ok(Err(error)) => Some(error.to_string()),
+                    Err(panic) => Some(panic.to_string()),
+                }
+            }
+        };
+        if let Some(error) = error {
+            let fault = format!("the lens's calibration is kept in memory only: {error}");
+            tracing::error!(%error, "the lens's calibration is kept in memory only");
+            calibration.notes.push(fault.clone());
+            news.fault = Some(fault);
+        }
+        // The client may have gone.
+        answer.send(Ok(calibration)).unwrap_or_default();
+        let seen = *self.seen.borrow();
+        self.status.send_replace(Arc::new(self.status(&seen, news)));
+    }
+
     /// Sends the points of the live curve that have come; whether there were any.
     fn send_curve(&mut self, snapshot: &Snapshot) -> bool {
         let mut any = false;
@@ -156,7 +193,8 @@ impl Publisher {
         tracing::trace!(listeners, "progress");
     }
 
-    fn status(&self, snapshot: &Snapshot, news: &News) -> Status {
+    fn status(&self, seen: &Seen, news: &News) -> Status {
+        let snapshot = &seen.snapshot;
         let device = |ready: bool, name: &str| ready.then(|| name.to_owned());
         let missing = match (snapshot.camera_ready, snapshot.lens_ready) {
             (true, true) => None,
@@ -174,16 +212,20 @@ impl Publisher {
         Status {
             mode: wire::mode(snapshot.mode),
             state: wire::state(snapshot.state),
-            phase: wire::phase(snapshot.phase),
+            phase: match snapshot.phase {
+                None if seen.calibrating => ipc::Phase::Calibrating,
+                phase => wire::phase(phase),
+            },
             run_id: snapshot.run.map(|run| run.0),
             lens_position: snapshot.lens.map(|lens| lens.position.0),
             lens_moving: snapshot.lens.is_some_and(|lens| lens.moving),
-            lens_range: Some(wire::lens_range(self.constants.limits)),
+            lens_range: Some(wire::lens_range(seen.limits)),
             event_rate: snapshot.event_rate.0,
             events_lost: snapshot.lost,
             last_run: news.last_run.clone(),
             camera: device(snapshot.camera_ready, &self.constants.devices.camera),
             lens: device(snapshot.lens_ready, &self.constants.devices.lens),
+            calibration: self.calibration.clone(),
             fault: missing.or_else(|| news.fault.clone()),
             real_time: self.grants.list(),
             version: env!("CARGO_PKG_VERSION").to_owned(),

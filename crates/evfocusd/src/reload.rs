@@ -66,9 +66,9 @@ impl Reloader {
             report_days: new.report_days,
             ..current.clone()
         };
-        let settings = next.controller(&self.lens).map_err(|error| refused(&error))?;
+        next.controller(&self.lens, None).map_err(|error| refused(&error))?;
         let access = Access::of(&next.access).map_err(|error| refused(&error))?;
-        let configure = Command::Configure { settings: Box::new(settings) };
+        let configure = Command::Configure { config: Box::new(next.clone()) };
         self.commands.try_send(configure).map_err(|_| Error::NotResponding { waited_s: 0.0 })?;
         self.access.send_replace(Arc::new(access));
         self.reports.keep(next.kept());
@@ -84,7 +84,7 @@ fn applicable(old: &Config, new: &Config) -> Vec<String> {
     names(&[
         ("focus", old.focus != new.focus),
         ("access", old.access != new.access),
-        ("lens.backlash_counts", old.lens_backlash.to_bits() != new.lens_backlash.to_bits()),
+        ("lens.backlash_counts", old.lens_backlash != new.lens_backlash),
         ("daemon.reports_kept", old.reports_kept != new.reports_kept),
         ("daemon.report_days", old.report_days != new.report_days),
     ])

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_ipc::server::{self, CallError, Info, Limits, Peer, Service, Socket, Stream};
-use evfocus_ipc::{Error, FocusRequest, ProtocolError, Reply, Request};
+use evfocus_ipc::{Calibration, Error, FocusRequest, ProtocolError, Reply, Request};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 
@@ -60,6 +60,7 @@ impl Service for Controller {
                 self.command(|answer| Command::MoveTo { position, answer }).await?;
                 Ok(Reply::Done {})
             }
+            Request::Calibrate => Ok(Reply::Calibration { calibration: Box::new(self.calibrate().await?) }),
             Request::SetMode { mode } => {
                 self.command(|answer| Command::SetMode { mode, answer }).await?;
                 Ok(Reply::Done {})
@@ -73,9 +74,9 @@ impl Service for Controller {
                 let report = aside(move || lookups.report(id)).await?;
                 Ok(Reply::Report { report: Box::new(report) })
             }
-            Request::ListDevices => {
+            Request::ListDevices { probe } => {
                 let lookups = Arc::clone(&self.handle.lookups);
-                Ok(Reply::Devices { devices: aside(move || lookups.devices()).await? })
+                Ok(Reply::Devices { devices: aside(move || lookups.devices(probe.as_deref())).await? })
             }
             Request::Reload => {
                 let lookups = Arc::clone(&self.handle.lookups);
@@ -96,6 +97,14 @@ impl Controller {
         let progress = self.handle.progress.upgrade().ok_or(Error::ShuttingDown {})?.subscribe();
         let run_id = self.command(|answer| Command::Focus { request, answer }).await?;
         stream::progress(progress, run_id, stream).await
+    }
+
+    /// Waits for as long as it takes, for as long as the control thread is there.
+    async fn calibrate(&self) -> Result<Calibration, Error> {
+        let (answer, answered) = oneshot::channel();
+        let sent = self.handle.commands.send(Command::Calibrate { answer }).await;
+        sent.map_err(|_| Error::ShuttingDown {})?;
+        answered.await.map_err(|_| Error::ShuttingDown {})?
     }
 
     /// Hands a command to the control thread and waits for its answer, but not for ever.

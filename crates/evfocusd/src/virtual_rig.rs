@@ -7,7 +7,9 @@ use std::time::Duration;
 use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, Input, Refusal, Snapshot};
 use evfocus_core::{Controller, CurvePoint, EventBatch, HostMicros, LensPosition, RunReport};
 use evfocus_hal::{Camera, Clock, DeviceError, Lens, VirtualClock};
+use evfocus_ipc::Calibration;
 
+use crate::calibration::{CalibrationFailure, Desk};
 use crate::config::Config;
 use crate::devices::{self, Devices};
 
@@ -44,6 +46,7 @@ pub struct VirtualRig {
     camera: Box<dyn Camera>,
     lens: Box<dyn Lens>,
     controller: Controller,
+    desk: Desk,
     batch: EventBatch,
     actions: Vec<Action>,
     lens_poll: Duration,
@@ -51,6 +54,7 @@ pub struct VirtualRig {
     /// When a device that failed is tried again.
     camera_failed: Option<HostMicros>,
     lens_failed: Option<HostMicros>,
+    lens_error: Option<DeviceError>,
 }
 
 impl std::fmt::Debug for VirtualRig {
@@ -66,6 +70,19 @@ impl VirtualRig {
     /// [`VirtualRigError`] if the configuration makes no sense or a device does not start.
     pub fn new(config: &Config) -> Result<Self, VirtualRigError> {
         Self::with_camera(config, |rig, _| Ok(Box::new(rig.devices().0)))
+    }
+
+    /// The rig of `config`, whose lens is what `open` makes of it: a driver and an emulated controller that things happen to, say.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_lens(
+        config: &Config,
+        open: impl FnOnce(&hil_sim::Rig, Arc<dyn Clock>) -> Result<Box<dyn Lens>, DeviceError>,
+    ) -> Result<Self, VirtualRigError> {
+        Self::with_devices(config, |rig, clock| {
+            Ok(Devices { camera: Box::new(rig.devices().0), lens: open(rig, clock)? })
+        })
     }
 
     /// The rig of `config`, seen through the camera that `open` makes of it: a driver and an emulated device, say.
@@ -94,20 +111,22 @@ impl VirtualRig {
         let rig = hil_sim::Rig::new(config.rig.clone(), clock.clone())?;
         let Devices { mut camera, lens } = open(&rig, clock.clone())?;
         camera.start()?;
-        let settings =
-            config.controller(&lens.info()).map_err(|bad| VirtualRigError::Settings(bad.to_string()))?;
+        let desk = Desk::new(config.clone(), lens.info(), None);
+        let settings = desk.settings().map_err(|bad| VirtualRigError::Settings(bad.to_string()))?;
         let mut virtual_rig = Self {
             controller: Controller::new(settings, camera.info().geometry, clock.now()),
             clock,
             rig,
             camera,
             lens,
+            desk,
             batch: EventBatch::with_capacity(BATCH_EVENTS),
             actions: Vec::with_capacity(16),
             lens_poll: config.lens_poll,
             next_poll: HostMicros(0),
             camera_failed: None,
             lens_failed: None,
+            lens_error: None,
         };
         // The daemon's clocks have long been related when somebody asks for focus.
         virtual_rig.run_for(START_UP);
@@ -197,9 +216,17 @@ impl VirtualRig {
             self.controller.handle(Input::LensReady, now, &mut self.actions);
         }
         match answer {
-            Ok(sample) => self.controller.handle(Input::Lens(sample), self.clock.now(), &mut self.actions),
+            Ok(sample) => {
+                self.desk.sample(sample);
+                self.controller.handle(Input::Lens(sample), self.clock.now(), &mut self.actions);
+            }
             Err(error) => self.fail_lens(&error),
         }
+    }
+
+    /// What the lens said when it failed last.
+    pub fn lens_error(&self) -> Option<&DeviceError> {
+        self.lens_error.as_ref()
     }
 
     fn fail_lens(&mut self, error: &DeviceError) {
@@ -208,7 +235,10 @@ impl VirtualRig {
         if !news {
             return;
         }
-        let input = Input::LensFailed(devices::failure(error));
+        self.lens_error = Some(error.clone());
+        let failure = devices::failure(error);
+        self.desk.lens_failed(failure);
+        let input = Input::LensFailed(failure);
         self.controller.handle(input, self.clock.now(), &mut self.actions);
     }
 
@@ -221,6 +251,7 @@ impl VirtualRig {
             if self.lens_failed.is_some() && action != Action::StopLens {
                 continue;
             }
+            let action = self.desk.order(action, &self.controller);
             if let Err(error) = devices::perform(action, self.lens.as_mut()) {
                 self.fail_lens(&error);
             }
@@ -233,6 +264,24 @@ impl VirtualRig {
         let end = self.clock.now() + duration;
         while self.clock.now() < end {
             self.step();
+        }
+    }
+
+    /// Calibrates the lens; what was measured counts from then on.
+    ///
+    /// # Errors
+    /// What a client would be told; the lens has been told to stop then.
+    pub fn calibrate(&mut self) -> Result<Calibration, CalibrationFailure> {
+        let refused = |message| CalibrationFailure { reason: "refused", message };
+        self.desk.begin(&mut self.controller, self.clock.now(), &mut self.actions).map_err(refused)?;
+        self.perform();
+        loop {
+            self.step();
+            let ended = self.desk.advance(&mut self.controller, self.clock.now(), &mut self.actions);
+            self.perform();
+            if let Some(ended) = ended {
+                return ended;
+            }
         }
     }
 

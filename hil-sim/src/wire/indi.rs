@@ -23,6 +23,8 @@ pub(super) struct IndiModel {
     speed: f64,
     /// Whether the state of the position is Busy, and when it is looked at next.
     busy: bool,
+    /// Aborted, and perhaps not yet at rest.
+    stopping: bool,
     next_poll: HostMicros,
     miscount: f64,
 }
@@ -43,6 +45,7 @@ impl IndiModel {
             period: Duration::from_millis(500),
             speed: HIGHEST_SPEED,
             busy: false,
+            stopping: false,
             next_poll: HostMicros(0),
             miscount: 0.0,
         }
@@ -127,7 +130,9 @@ impl IndiModel {
             ("FOCUS_SPEED", Some(speed)) => self.speed = speed.clamp(1.0, HIGHEST_SPEED),
             ("FOCUS_ABORT_MOTION", _) if self.connected => {
                 self.motor.brake(now);
-                self.busy = false;
+                // What it runs on by is still told.
+                (self.busy, self.stopping) = (false, true);
+                self.next_poll = now + self.period;
                 self.update("Idle", now, out);
             }
             ("ABS_FOCUS_POSITION", Some(target)) if self.connected => {
@@ -145,7 +150,7 @@ impl IndiModel {
                 }
                 let speed = self.motor.max_speed() * self.speed / HIGHEST_SPEED;
                 self.motor.travel(now, target - self.miscount, speed);
-                self.busy = true;
+                (self.busy, self.stopping) = (true, false);
                 self.next_poll = now + self.period;
                 self.update("Busy", now, out);
             }
@@ -184,14 +189,21 @@ impl Device for IndiModel {
     }
 
     fn due(&self) -> Option<HostMicros> {
-        self.busy.then_some(self.next_poll)
+        (self.busy || self.stopping).then_some(self.next_poll)
     }
 
     fn speak(&mut self, now: HostMicros, said: &mut Vec<u8>) {
         let mut out = String::new();
         self.next_poll = now + self.period;
-        self.busy = self.motor.report(now).1;
-        self.update(if self.busy { "Busy" } else { "Ok" }, now, &mut out);
+        let moving = self.motor.report(now).1;
+        let state = if self.stopping {
+            self.stopping = moving;
+            "Idle"
+        } else {
+            self.busy = moving;
+            if moving { "Busy" } else { "Ok" }
+        };
+        self.update(state, now, &mut out);
         said.extend(out.bytes());
     }
 

@@ -7,6 +7,9 @@ use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Transport};
 
 use super::line::Line;
 use super::{Motor, Protocol, WireFault};
+use crate::LensConfig;
+use crate::lens::LensState;
+use crate::random::Stream;
 
 /// A lens controller's port. Clones are handles to the same controller.
 #[derive(Clone)]
@@ -26,6 +29,13 @@ impl WirePort {
     pub(crate) fn new(protocol: Protocol, motor: Motor, clock: Arc<dyn Clock>) -> Self {
         let line = Arc::new(Mutex::new(Line::new(protocol, motor)));
         Self { line, clock, name: format!("simulated {protocol}") }
+    }
+
+    /// A controller with a motor, and no rig around it: nobody looks through its lens.
+    pub fn with_a_motor(protocol: Protocol, lens: LensConfig, clock: Arc<dyn Clock>) -> Self {
+        let state = LensState::new(lens, &[], Stream::LensReadOut.generator(0));
+        let motor = Motor::new(Arc::new(Mutex::new(state)), clock.now());
+        Self::new(protocol, motor, clock)
     }
 
     /// Connects. Bytes take the time that they would take on the real line: the caller waits on the rig's clock.

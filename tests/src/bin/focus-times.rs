@@ -76,7 +76,7 @@ fn cell(class: &Class, request: FocusRequest) -> Result<Cell> {
                 MotionConfig { shake_px_rms: shake, roll_rad_rms: 0.0015 * shake, ..MotionConfig::default() };
             rig.seed = index as u64 + 1;
             // A stepper's play is measured when the rig is set up.
-            config.lens_backlash = backlash;
+            config.lens_backlash = Some(backlash);
             let mut rig = VirtualRig::new(&config)?;
             if request.pace == Some(Pace::Fast) {
                 // A fast run counts on what an earlier one has taught of the pixels' delay.

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::{Device, Progress, Report, Status};
+use crate::{Calibration, Device, Progress, Report, Status};
 
 /// Of `GetStatus` and `Monitor`.
 #[derive(Debug, Deserialize)]
@@ -26,6 +26,12 @@ pub(super) struct OfAbort {
 #[derive(Debug, Deserialize)]
 pub(super) struct OfReport {
     pub(super) report: Report,
+}
+
+/// Of `Calibrate`.
+#[derive(Debug, Deserialize)]
+pub(super) struct OfCalibrate {
+    pub(super) calibration: Calibration,
 }
 
 /// Of `ListDevices`.

@@ -18,7 +18,7 @@ struct Serial {
 }
 
 /// Opens the port and takes it for this program alone.
-pub(super) fn open(path: &str, baud: u32, clock: Arc<dyn Clock>) -> Result<Box<dyn Transport>, DeviceError> {
+pub(crate) fn open(path: &str, baud: u32, clock: Arc<dyn Clock>) -> Result<Box<dyn Transport>, DeviceError> {
     // DTR is left alone: pseudo-terminals have none, and Arduinos reset when it changes.
     let port = serialport::new(path, baud)
         .timeout(WRITE_TIMEOUT)

@@ -9,3 +9,4 @@ mod indi;
 mod labjack;
 mod moonlite;
 mod optotune;
+mod probe;

@@ -15,15 +15,26 @@ use crate::output::Output;
 #[command(after_help = "\
 Examples:
   evfocus devices
+  evfocus devices --probe
+  evfocus devices --probe /dev/ttyUSB0,/dev/ttyACM0
   evfocus devices --json | jq '.[] | select(.state != \"active\")'")]
 pub struct Arguments {
+    /// Ask what answers on the free serial ports: those on USB, or those named. Resets some boards; up to 8 s a port
+    #[arg(long, value_name = "PORT", num_args = 0.., value_delimiter = ',')]
+    probe: Option<Vec<String>>,
     #[command(flatten)]
     socket: SocketArguments,
 }
 
 /// Prints the list.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
-    let devices = block_on(async { Ok(connect(&arguments.socket).await?.devices().await?) })?;
+    let devices = block_on(async {
+        let mut client = connect(&arguments.socket).await?;
+        Ok(match arguments.probe.clone() {
+            None => client.devices().await?,
+            Some(ports) => client.devices_asked(ports).await?,
+        })
+    })?;
     let mut out = Output::new();
     if arguments.socket.json {
         out.json(&devices)?;

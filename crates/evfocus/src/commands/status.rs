@@ -10,7 +10,7 @@ use crate::connection::{block_on, connect};
 use crate::exit::Exit;
 use crate::output::Output;
 use crate::quantity::{answer, count, rate};
-use crate::report_text::flags;
+use crate::report_text::{calibration, flags};
 
 /// Say what the daemon is doing: mode, state, lens, events, last run
 #[derive(Debug, Args)]
@@ -48,6 +48,9 @@ fn print(status: &Status, out: &mut Output) -> anyhow::Result<()> {
     writeln!(out, "camera    {}", status.camera.as_deref().unwrap_or("none"))?;
     writeln!(out, "lens      {}", status.lens.as_deref().unwrap_or("none"))?;
     writeln!(out, "position  {}", position(status))?;
+    if let Some(known) = &status.calibration {
+        writeln!(out, "measured  {}", calibration(known))?;
+    }
     writeln!(out, "events    {}, {} lost so far", rate(status.event_rate), count(status.events_lost))?;
     if let Some(last) = &status.last_run {
         writeln!(out, "last run  {}", last_run(last))?;

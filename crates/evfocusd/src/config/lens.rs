@@ -3,7 +3,7 @@
 mod drivers;
 
 use evfocus_core::{LensPosition, LensRange, LensSpeed};
-use evfocus_hal::LensInfo;
+use evfocus_hal::{LensClass, LensInfo};
 use evfocus_lens::firmata::{self, FirmataConfig};
 use evfocus_lens::grbl::{self, GrblConfig};
 use evfocus_lens::indi::{self, IndiConfig};
@@ -41,8 +41,8 @@ pub struct LensSection {
     pub max_counts: Option<f64>,
     /// How often the lens is asked where it is, milliseconds; 0.5 to 1000.
     pub poll_ms: f64,
-    /// Play between what the lens reports and the glass, counts; 0 to 1e6.
-    pub backlash_counts: f64,
+    /// Play between what the lens reports and the glass, counts; 0 to 1e6. Absent: as it was calibrated, else 0.
+    pub backlash_counts: Option<f64>,
     /// For `moonlite`.
     pub moonlite: MoonLiteSection,
     /// For `optotune`.
@@ -68,7 +68,7 @@ impl Default for LensSection {
             min_counts: None,
             max_counts: None,
             poll_ms: 2.0,
-            backlash_counts: 0.0,
+            backlash_counts: None,
             moonlite: MoonLiteSection::default(),
             optotune: OptotuneSection::default(),
             grbl: GrblSection::default(),
@@ -282,7 +282,9 @@ impl LensBackend {
     /// What the lens will say of itself, where that is known without asking it.
     pub(super) fn expected(&self, rig: &hil_sim::RigConfig) -> Option<LensInfo> {
         match self {
-            Self::Simulated => Some(info(rig.lens.range, rig.lens.max_speed, rig.lens.needs_homing)),
+            Self::Simulated => {
+                Some(info(LensClass::Positioner, rig.lens.range, rig.lens.max_speed, rig.lens.needs_homing))
+            }
             Self::Driver { driver, .. } => driver.expected(),
         }
     }
@@ -311,9 +313,11 @@ impl LensDriver {
 
     fn expected(&self) -> Option<LensInfo> {
         match self {
-            Self::MoonLite(config) => Some(info(config.range, config.max_speed, false)),
+            Self::MoonLite(config) => {
+                Some(info(LensClass::Positioner, config.range, config.max_speed, false))
+            }
             Self::Firmata(FirmataConfig { drive, .. }) | Self::LabJack(LabJackConfig { drive, .. }) => {
-                Some(info(drive.range, drive.max_speed, false))
+                Some(info(LensClass::RateDrive, drive.range, drive.max_speed, false))
             }
             // Their ranges or speeds are their own.
             Self::Optotune(_) | Self::Grbl(_) | Self::Indi(_) => None,
@@ -322,6 +326,14 @@ impl LensDriver {
 }
 
 /// What matters of a lens before it is there.
-fn info(range: LensRange, max_speed: LensSpeed, needs_homing: bool) -> LensInfo {
-    LensInfo { model: String::new(), serial: String::new(), range, max_speed, needs_homing }
+fn info(class: LensClass, range: LensRange, max_speed: LensSpeed, needs_homing: bool) -> LensInfo {
+    LensInfo {
+        model: String::new(),
+        serial: String::new(),
+        range,
+        class,
+        max_speed,
+        speed_is_share: false,
+        needs_homing,
+    }
 }

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, Input, Pace, Snapshot};
+use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, Input, Pace, Refusal, Snapshot};
 use evfocus_core::{
-    Controller, ControllerConfig, CurvePoint, DelayModel, EventBatch, Geometry, HostMicros, LensSample,
-    RunId, RunReport,
+    Controller, CurvePoint, DelayModel, EventBatch, Geometry, HostMicros, LensRange,
+    LensSample, RunId, RunReport,
 };
 use evfocus_hal::Clock;
 use evfocus_ipc as ipc;
@@ -15,7 +15,9 @@ use tokio::sync::{mpsc, watch};
 
 use super::orders::OrderSender;
 use super::{Notice, StopFlag};
-use crate::handle::Command;
+use crate::calibration::{CalibrationFailure, Desk};
+use crate::config::Config;
+use crate::handle::{Answer, Command};
 use crate::vitals::Vitals;
 use crate::wire;
 
@@ -34,11 +36,33 @@ pub(crate) const REPORTS: usize = 16;
 #[derive(Debug)]
 pub(crate) struct Publications {
     /// The state, a few dozen times a second.
-    pub(crate) snapshots: watch::Sender<Snapshot>,
+    pub(crate) seen: watch::Sender<Seen>,
     /// The live curve.
     pub(crate) curve: Producer<(RunId, CurvePoint)>,
     /// The record of each run.
     pub(crate) reports: mpsc::Sender<Box<EndedRun>>,
+    /// What was measured of the lens, with whom to tell.
+    pub(crate) calibrations: mpsc::Sender<Calibrated>,
+}
+
+/// What can be seen from outside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Seen {
+    /// Of the controller.
+    pub(crate) snapshot: Snapshot,
+    /// Whether the lens is being calibrated.
+    pub(crate) calibrating: bool,
+    /// Where the lens may go: as configured, and as far as it was found to go.
+    pub(crate) limits: LensRange,
+}
+
+/// A lens that was calibrated.
+#[derive(Debug)]
+pub(crate) struct Calibrated {
+    /// What was measured.
+    pub(crate) calibration: ipc::Calibration,
+    /// Who asked for it.
+    pub(crate) answer: Answer<ipc::Calibration>,
 }
 
 /// A run that ended, with what its record does not hold.
@@ -75,11 +99,15 @@ pub(crate) struct ControlThread {
     /// Orders to the lens.
     pub(crate) orders: OrderSender,
     /// Settings that wait for the end of the run under way.
-    pub(crate) new_settings: Option<Box<ControllerConfig>>,
+    pub(crate) new_settings: Option<Box<Config>>,
     /// Shows others that this thread makes progress, and how fast.
     pub(crate) vitals: Vitals,
     /// To the socket's side.
     pub(crate) publications: Publications,
+    /// What was measured of the lens, and measures it.
+    pub(crate) desk: Desk,
+    /// Who waits for the calibration under way.
+    pub(crate) calibration_asked: Option<Answer<ipc::Calibration>>,
     /// When to end.
     pub(crate) stop: StopFlag,
 }
@@ -94,7 +122,7 @@ impl ControlThread {
     /// Runs until stopped; a run under way is aborted then. Dropping the orders' queue stops the lens.
     pub(crate) fn run(mut self) {
         let mut actions = Vec::with_capacity(ACTIONS);
-        let mut published = (HostMicros(i64::MIN), self.controller.snapshot());
+        let mut published = (HostMicros(i64::MIN), self.seen());
         let mut curve_sent = (RunId(0), 0);
         while !self.stop.is_stopped() {
             std::thread::park_timeout(NAP);
@@ -104,11 +132,15 @@ impl ControlThread {
             self.take_batches(&mut actions);
             self.controller.handle(Input::Tick, self.clock.now(), &mut actions);
             self.perform(&mut actions);
+            self.calibrate(&mut actions);
             self.take_commands(&mut actions);
             self.publish_curve(&mut curve_sent);
             self.take_settings();
             self.publish(&mut published);
             self.vitals.beat();
+        }
+        if let Some(answer) = self.calibration_asked.take() {
+            reply(answer, Err(ipc::Error::ShuttingDown {}));
         }
         if self.controller.command(CoreCommand::Abort, self.clock.now(), &mut actions).is_ok() {
             self.perform(&mut actions);
@@ -124,6 +156,9 @@ impl ControlThread {
                     Notice::LensFailed(failure) => Input::LensFailed(failure),
                     Notice::LensReady => Input::LensReady,
                 };
+                if let Notice::LensFailed(failure) = notice {
+                    self.desk.lens_failed(failure);
+                }
                 self.controller.handle(input, self.clock.now(), actions);
             }
         }
@@ -131,6 +166,7 @@ impl ControlThread {
 
     fn take_samples(&mut self, actions: &mut Vec<Action>) {
         while let Ok(sample) = self.samples.pop() {
+            self.desk.sample(sample);
             self.controller.handle(Input::Lens(sample), self.clock.now(), actions);
         }
     }
@@ -150,6 +186,10 @@ impl ControlThread {
     fn take_commands(&mut self, actions: &mut Vec<Action>) {
         while let Ok(command) = self.commands.try_recv() {
             let now = self.clock.now();
+            if self.desk.is_calibrating() {
+                self.command_while_calibrating(command);
+                continue;
+            }
             match command {
                 Command::Focus { request, answer } => {
                     reply(answer, self.focus(&request, now, actions));
@@ -167,12 +207,13 @@ impl ControlThread {
                     let done = self.controller.command(CoreCommand::MoveTo(target), now, actions);
                     reply(answer, done.map(|_| ()).map_err(|refusal| wire::refusal(&refusal)));
                 }
+                Command::Calibrate { answer } => self.begin_calibration(answer, now, actions),
                 Command::SetMode { mode, answer } => {
                     let done =
                         self.controller.command(CoreCommand::SetMode(wire::core_mode(mode)), now, actions);
                     reply(answer, done.map(|_| ()).map_err(|refusal| wire::refusal(&refusal)));
                 }
-                Command::Configure { settings } => self.new_settings = Some(settings),
+                Command::Configure { config } => self.new_settings = Some(config),
             }
             self.perform(actions);
         }
@@ -180,10 +221,14 @@ impl ControlThread {
 
     /// New settings must not change a run under way.
     fn take_settings(&mut self) {
-        if self.controller.snapshot().run.is_none()
-            && let Some(settings) = self.new_settings.take()
-        {
-            self.controller.reconfigure(*settings);
+        if self.controller.snapshot().run.is_some() || self.desk.is_calibrating() {
+            return;
+        }
+        let Some(config) = self.new_settings.take() else { return };
+        self.desk.configure(*config);
+        match self.desk.settings() {
+            Ok(settings) => drop(self.controller.reconfigure(settings)),
+            Err(error) => tracing::error!(%error, "the new settings do not suit the lens as it was calibrated"),
         }
     }
 
@@ -205,12 +250,72 @@ impl ControlThread {
         }
     }
 
+    fn begin_calibration(
+        &mut self,
+        answer: Answer<ipc::Calibration>,
+        now: HostMicros,
+        actions: &mut Vec<Action>,
+    ) {
+        let Snapshot { run, lens_ready, .. } = self.controller.snapshot();
+        let refused = if let Some(run) = run {
+            ipc::Error::Busy { run_id: run.0 }
+        } else if !lens_ready {
+            wire::refusal(&Refusal::NoLens)
+        } else if let Err(remedy) = self.desk.begin(&mut self.controller, now, actions) {
+            ipc::Error::NotPermitted { what: "calibrating".to_owned(), remedy }
+        } else {
+            // That of its focus runs.
+            self.pace = Pace::Accurate;
+            self.calibration_asked = Some(answer);
+            return;
+        };
+        reply(answer, Err(refused));
+    }
+
+    /// Goes on with the calibration under way.
+    fn calibrate(&mut self, actions: &mut Vec<Action>) {
+        let ended = self.desk.advance(&mut self.controller, self.clock.now(), actions);
+        self.perform(actions);
+        let Some(ended) = ended else { return };
+        let Some(answer) = self.calibration_asked.take() else { return };
+        match ended {
+            Ok(calibration) => {
+                let told = Calibrated { calibration, answer };
+                if self.publications.calibrations.try_send(told).is_err() {
+                    tracing::error!("the calibration was not taken and is kept in memory only");
+                }
+            }
+            Err(CalibrationFailure { reason, message }) => {
+                tracing::warn!(reason, message, "the lens was not calibrated");
+                reply(answer, Err(ipc::Error::CalibrationFailed { reason: reason.to_owned(), message }));
+            }
+        }
+    }
+
+    /// A command during a calibration: only an abort is taken.
+    fn command_while_calibrating(&mut self, command: Command) {
+        let refused = || ipc::Error::NotPermitted {
+            what: "this while the lens is being calibrated".to_owned(),
+            remedy: "wait for its end, or abort it".to_owned(),
+        };
+        match command {
+            Command::Abort { answer } => {
+                self.desk.abort();
+                reply(answer, Ok(None));
+            }
+            Command::Focus { answer, .. } => reply(answer, Err(refused())),
+            Command::MoveTo { answer, .. } | Command::SetMode { answer, .. } => reply(answer, Err(refused())),
+            Command::Calibrate { answer } => reply(answer, Err(refused())),
+            Command::Configure { config } => self.new_settings = Some(config),
+        }
+    }
+
     fn perform(&mut self, actions: &mut Vec<Action>) {
         for action in actions.drain(..) {
             if action == Action::RunEnded {
                 self.hand_over_report();
             } else {
-                self.orders.send(action);
+                self.orders.send(self.desk.order(action, &self.controller));
             }
         }
     }
@@ -240,19 +345,30 @@ impl ControlThread {
         }
     }
 
-    fn publish(&mut self, published: &mut (HostMicros, Snapshot)) {
-        let (now, snapshot) = (self.clock.now(), self.controller.snapshot());
-        let changed = (snapshot.mode, snapshot.state, snapshot.phase, snapshot.run)
-            != (published.1.mode, published.1.state, published.1.phase, published.1.run);
+    fn seen(&self) -> Seen {
+        Seen {
+            snapshot: self.controller.snapshot(),
+            calibrating: self.desk.is_calibrating(),
+            limits: self.controller.config().limits,
+        }
+    }
+
+    fn publish(&mut self, published: &mut (HostMicros, Seen)) {
+        let (now, seen) = (self.clock.now(), self.seen());
+        let state = |seen: &Seen| {
+            let Snapshot { mode, state, phase, run, .. } = seen.snapshot;
+            (mode, state, phase, run, seen.calibrating)
+        };
+        let changed = state(&seen) != state(&published.1);
         if changed || now.since(published.0) >= PUBLISH {
-            *published = (now, snapshot);
-            self.publications.snapshots.send_replace(snapshot);
+            *published = (now, seen);
+            self.publications.seen.send_replace(seen);
         }
     }
 }
 
 /// Answers a client, who may have gone.
-fn reply<Value>(answer: crate::handle::Answer<Value>, value: Result<Value, ipc::Error>) {
+fn reply<Value>(answer: Answer<Value>, value: Result<Value, ipc::Error>) {
     if answer.send(value).is_err() {
         tracing::debug!("a client went before its answer");
     }

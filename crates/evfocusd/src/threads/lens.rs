@@ -173,7 +173,7 @@ mod tests {
     use std::sync::Mutex;
 
     use evfocus_core::{LensPosition, LensRange, LensSpeed};
-    use evfocus_hal::{DeviceErrorKind, LensInfo, VirtualClock};
+    use evfocus_hal::{DeviceErrorKind, LensClass, LensInfo, VirtualClock};
     use rtrb::{Consumer, RingBuffer};
 
     use super::super::orders::orders;
@@ -204,6 +204,8 @@ mod tests {
         fn info(&self) -> LensInfo {
             LensInfo {
                 model: "fake".to_owned(),
+                class: LensClass::Positioner,
+                speed_is_share: false,
                 serial: "1".to_owned(),
                 range: LensRange::new(LensPosition(0.0), LensPosition(1.0)).unwrap(),
                 max_speed: LensSpeed::new(1.0).unwrap(),

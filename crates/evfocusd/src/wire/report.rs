@@ -45,6 +45,8 @@ pub(crate) struct Circumstances {
     pub(crate) started_unix_s: f64,
     /// The devices.
     pub(crate) devices: ipc::RunDevices,
+    /// What was measured of the lens.
+    pub(crate) calibration: Option<ipc::Calibration>,
 }
 
 /// The record of a run as the socket and the report file show it.
@@ -69,6 +71,7 @@ pub(crate) fn report(ended: &EndedRun, circumstances: Circumstances) -> ipc::Rep
         map: run.map().as_ref().map(parts_report::map),
         delay_us: run.delay_us,
         rig_delay: Some(rig_delay(delays)),
+        calibration: circumstances.calibration,
         hot_pixels: run.hot_pixels as u64,
         clock_map: (run.clock.observations > 0).then_some(ipc::ClockMap {
             offset_us: run.clock.offset_us,

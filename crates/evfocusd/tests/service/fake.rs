@@ -134,6 +134,10 @@ impl Fake {
                         }
                     }));
                 }
+                Command::Calibrate { answer } => {
+                    let (reason, message) = ("lens-lost".to_owned(), "a fake lens".to_owned());
+                    drop(answer.send(Err(Error::CalibrationFailed { reason, message })));
+                }
                 Command::SetMode { mode, answer } => {
                     self.state.lock().unwrap().mode = mode;
                     self.change(|status| status.mode = mode);
@@ -224,7 +228,7 @@ struct FakeLookups {
 }
 
 impl Lookups for FakeLookups {
-    fn devices(&self) -> Result<Vec<Device>, Error> {
+    fn devices(&self, _probe: Option<&[String]>) -> Result<Vec<Device>, Error> {
         Ok(vec![Device {
             role: DeviceRole::Camera,
             driver: "fake".to_owned(),
@@ -295,6 +299,7 @@ fn report(run_id: u64, request: FocusRequest, state: State, reason: Option<&str>
         map: None,
         delay_us: None,
         rig_delay: None,
+        calibration: None,
         hot_pixels: 0,
         clock_map: None,
         events: evfocus_ipc::EventCounts::default(),

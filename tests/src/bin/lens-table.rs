@@ -1,0 +1,120 @@
+//! A focus run of the daemon's loop through each lens driver and the model of its device, against the simulated lens without a
+//! protocol before it; virtual time, as Markdown: `cargo run --release -p evfocus-tests --bin lens-table`. Names of drivers as
+//! arguments make a table of those only.
+#![expect(clippy::print_stdout, reason = "the table is what this program is for")]
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use evfocus_core::controller::FocusRequest;
+use evfocus_core::{LensPosition, Outcome, Phase};
+use evfocus_tests::lenses::{EmulatedLens, LENSES, config};
+use evfocusd::config::LensBackend;
+use evfocusd::{Config, VirtualRig};
+use hil_sim::MotionConfig;
+
+/// Where focus lies, as shares of the range; the shake of the camera, pixels RMS; and the seeds.
+const FOCUSES: [f64; 3] = [0.25, 0.5, 0.75];
+const SHAKES: [f64; 2] = [0.0, 2.0];
+const SEEDS: [u64; 2] = [1, 2];
+
+/// One run.
+struct Run {
+    error: f64,
+    sweep: Duration,
+    /// Positions per second in the first sweep.
+    read_back_hz: f64,
+    elapsed: Duration,
+}
+
+fn run(config: &Config) -> Result<Run> {
+    let mut rig = VirtualRig::new(config)?;
+    let mut times = BTreeSet::new();
+    let report = rig.focus(FocusRequest::default(), |_, snapshot, _| {
+        if let (Some(Phase::Sweeping), Some(lens)) = (snapshot.phase, snapshot.lens) {
+            times.insert(lens.time());
+        }
+    })?;
+    let truth = *rig.truth().first().context("a truth")?;
+    let Outcome::Focused { position } = report.outcome else {
+        bail!("seed {}: {:?}", config.rig.seed, report.outcome)
+    };
+    let sweep = Phase::ALL.into_iter().zip(report.phases).find(|(phase, _)| *phase == Phase::Sweeping);
+    let (first, last) = (times.first().context("positions")?, times.last().context("positions")?);
+    Ok(Run {
+        error: position.counts_from(truth),
+        sweep: sweep.context("a sweep")?.1,
+        read_back_hz: (times.len() - 1) as f64 / last.since(*first).as_secs_f64(),
+        elapsed: report.elapsed(),
+    })
+}
+
+fn row(lens: &EmulatedLens) -> Result<String> {
+    let (mut behind, mut plain) = (Vec::new(), Vec::new());
+    for share in FOCUSES {
+        for shake in SHAKES {
+            for seed in SEEDS {
+                let mut config = config(lens.section, seed)?;
+                let range = config.rig.lens.range;
+                config.rig.focus = LensPosition((range.min().0 + share * range.length()).round());
+                config.rig.motion = MotionConfig {
+                    shake_px_rms: shake,
+                    roll_rad_rms: 0.0015 * shake,
+                    ..MotionConfig::default()
+                };
+                behind.push(run(&config)?);
+                let direct = run(&Config { lens: LensBackend::Simulated, ..config })?;
+                if std::env::var_os("LENS_TABLE_VERBOSE").is_some() {
+                    println!(
+                        "{} {share} {shake} {seed}: {:+.2} plain {:+.2}",
+                        lens.name,
+                        behind.last().map_or(0.0, |run: &Run| run.error),
+                        direct.error
+                    );
+                }
+                plain.push(direct);
+            }
+        }
+    }
+    let mean = |runs: &[Run], value: fn(&Run) -> f64| runs.iter().map(value).sum::<f64>() / runs.len() as f64;
+    let worst = behind.iter().map(|run| run.error.abs()).fold(0.0, f64::max);
+    let (error, plain_error) = (mean(&behind, |run| run.error.abs()), mean(&plain, |run| run.error.abs()));
+    Ok(format!(
+        "| {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.0} | {:.2} | {:.2} |",
+        lens.name,
+        error,
+        worst,
+        plain_error,
+        error / plain_error,
+        mean(&behind, |run| run.read_back_hz),
+        mean(&behind, |run| run.sweep.as_secs_f64()),
+        mean(&behind, |run| run.elapsed.as_secs_f64()),
+    ))
+}
+
+fn main() -> Result<()> {
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let lenses: Vec<_> =
+        LENSES.iter().filter(|lens| asked.is_empty() || asked.iter().any(|name| name == lens.name)).collect();
+    println!(
+        "Mean and greatest error against truth in counts of 3530, over {} runs; the same of the simulated lens without a protocol before \
+         it, on the same seeds; positions per second in the first sweep; seconds from its begin to its end, and of the whole run.\n",
+        FOCUSES.len() * SHAKES.len() * SEEDS.len()
+    );
+    println!(
+        "| driver | mean error | greatest | without protocol | ratio | positions/s | sweep, s | run, s |"
+    );
+    println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+    // Two at a time: the rigs are what takes the memory.
+    for pair in lenses.chunks(2) {
+        let rows: Vec<Result<String>> = std::thread::scope(|scope| {
+            let rows: Vec<_> = pair.iter().map(|lens| scope.spawn(|| row(lens))).collect();
+            rows.into_iter().map(|row| row.join().unwrap_or_else(|_| bail!("a run panicked"))).collect()
+        });
+        for row in rows {
+            println!("{}", row?);
+        }
+    }
+    Ok(())
+}
