@@ -136,6 +136,7 @@ fn a_lens_that_sticks_in_mid_sweep_does_not_focus() -> Result<()> {
 #[test]
 fn what_is_wrong_at_the_start_has_its_name() -> Result<()> {
     for lens in &LENSES {
+        let is_tcp = ["labjack", "indi"].contains(&lens.name);
         for (opening, kinds) in [
             (Opening::NoSuchPort, &[DeviceErrorKind::Disconnected][..]),
             (Opening::InUse, &[DeviceErrorKind::Busy]),
@@ -143,6 +144,10 @@ fn what_is_wrong_at_the_start_has_its_name() -> Result<()> {
             (Opening::Silence, &[DeviceErrorKind::TimedOut]),
             (Opening::WrongBaud, &[DeviceErrorKind::TimedOut, DeviceErrorKind::Protocol]),
         ] {
+            if is_tcp && opening == Opening::InUse {
+                // A TCP port takes many; what is behind it may not, and then says nothing.
+                continue;
+            }
             let error = open_error(lens, opening)?;
             assert!(kinds.contains(&error.kind), "{}, {}: {error}", lens.name, opening.name());
         }

@@ -7,11 +7,11 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use evfocus_core::controller::{Command, FocusRequest};
 use evfocus_core::{HostMicros, LensPosition, Outcome, Phase};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, VirtualClock};
+use evfocus_hal::{Clock, DeviceError, Lens, SystemClock, VirtualClock};
 use evfocus_lens::Port;
 use evfocusd::config::{LensBackend, LensDriver};
 use evfocusd::{VirtualRig, devices};
-use hil_sim::wire::{Protocol, WireFault, WirePort};
+use hil_sim::wire::{Protocol, Server, WireFault, WirePort};
 use hil_sim::{Fault, FaultKind, FaultTrigger, Rig};
 
 use crate::lenses::{EmulatedLens, config};
@@ -92,10 +92,7 @@ pub fn open_error(lens: &EmulatedLens, opening: Opening) -> Result<DeviceError> 
     let place = match opening {
         Opening::NoSuchPort if is_tcp => Port::tcp("127.0.0.1:1", Arc::clone(&clock)),
         Opening::NoSuchPort => Port::serial("/dev/ttyNOBODY", 9600, Arc::clone(&clock)),
-        Opening::InUse => {
-            let busy = || DeviceError::new(DeviceErrorKind::Busy, "emulated", "close the other program");
-            Port::new("emulated", Box::new(move || Err(busy())))
-        }
+        Opening::InUse => return in_use(&driver, lens),
         Opening::OtherDevice => {
             let other = if protocol == Protocol::Grbl { Protocol::Firmata } else { Protocol::Grbl };
             port(&model(other, lens, &clock)?)
@@ -112,6 +109,18 @@ pub fn open_error(lens: &EmulatedLens, opening: Opening) -> Result<DeviceError> 
     };
     match devices::open_driver(&driver, place, clock) {
         Ok(_) => bail!("{} was opened: {}", lens.name, opening.name()),
+        Err(error) => Ok(error),
+    }
+}
+
+/// The error of opening a pseudo-terminal that is open already, in real time.
+fn in_use(driver: &LensDriver, lens: &EmulatedLens) -> Result<DeviceError> {
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
+    let server = Server::pty(model(driver.protocol(), lens, &clock)?)?;
+    let serial = || Port::serial(server.address(), 9600, Arc::clone(&clock));
+    let _held = devices::open_driver(driver, serial(), Arc::clone(&clock))?;
+    match devices::open_driver(driver, serial(), Arc::clone(&clock)) {
+        Ok(_) => bail!("{} was opened twice", lens.name),
         Err(error) => Ok(error),
     }
 }
@@ -250,28 +259,21 @@ pub fn strike(lens: &EmulatedLens, fault: MidSweep) -> Result<Aftermath> {
     })?;
     let wire = wire.context("a wire")?;
     rig.command(Command::Focus(FocusRequest::default()))?;
-    let (mut struck, mut moved, mut glass) = (None, None, rig.rig().glass(rig.now()));
+    let mut struck = None;
     let end = rig.now() + Duration::from_secs(60);
-    let mut has_stood = false;
-    while rig.now() < end && !(has_stood && rig.controller().snapshot().run.is_none()) {
+    while rig.now() < end && (struck.is_none() || rig.controller().snapshot().run.is_some()) {
         rig.step();
-        let (now, phase) = (rig.now(), rig.controller().snapshot().phase);
-        let at = rig.rig().glass(now);
-        match struck {
-            None if phase == Some(Phase::Sweeping) && at.0 >= WHERE => {
-                (struck, moved) = (Some(now), Some(now));
-                if let Some(fault) = fault.on_the_wire() {
-                    wire.strike(fault);
-                }
+        let phase = rig.controller().snapshot().phase;
+        if struck.is_none() && phase == Some(Phase::Sweeping) && rig.rig().glass(rig.now()).0 >= WHERE {
+            struck = Some(rig.now());
+            if let Some(fault) = fault.on_the_wire() {
+                wire.strike(fault);
             }
-            // The first standstill after the fault ends the motion that it met.
-            Some(_) if !has_stood && at.distance(glass) > 0.02 => moved = Some(now),
-            Some(_) => has_stood |= moved.is_some_and(|moved: HostMicros| now.since(moved) > STANDSTILL),
-            None => {}
         }
-        glass = at;
     }
-    let (struck, moved) = (struck.context("the fault did not strike")?, moved.unwrap_or_default());
+    let struck = struck.context("the fault did not strike")?;
+    rig.run_for(Duration::from_secs(1));
+    let moved_on = moved_on(rig.rig(), struck, rig.now());
     let reason = match rig.controller().report().map(|report| report.outcome) {
         Some(Outcome::Failed(failure)) => failure.name(),
         Some(Outcome::Focused { .. }) => "focused",
@@ -293,5 +295,19 @@ pub fn strike(lens: &EmulatedLens, fault: MidSweep) -> Result<Aftermath> {
         },
         Err(refused) => refused.to_string(),
     };
-    Ok(Aftermath { reason, moved_on: moved.since(struck), stopping, error, afterwards })
+    Ok(Aftermath { reason, moved_on, stopping, error, afterwards })
+}
+
+/// How long the glass goes on after `struck`: until it first stands still.
+fn moved_on(rig: &Rig, struck: HostMicros, end: HostMicros) -> Duration {
+    let step = Duration::from_millis(1);
+    let (mut time, mut moved) = (struck, struck);
+    while time < end && time.since(moved) < STANDSTILL {
+        let before = rig.glass(time);
+        time = time + step;
+        if rig.glass(time).distance(before) > 0.02 {
+            moved = time;
+        }
+    }
+    moved.since(struck)
 }

@@ -65,6 +65,39 @@ def optotune():
         check("it changes the mode", lens.mode() == "focal")
 
 
+def grbl():
+    """`grbl-streamer` drives our model of a GRBL controller."""
+    from grbl_streamer import GrblStreamer
+
+    with Emulator("grbl") as emulator:
+        seen = {}
+        machine = GrblStreamer(lambda event, *data: seen.__setitem__(event, data))
+        machine.setup_logging()
+        machine.poll_interval = 0.05
+        machine.cnect(emulator.address, 115200)
+        try:
+            until("it boots", lambda: "on_boot" in seen)
+            machine.poll_start()
+            until("it reports its state", lambda: machine.cmode == "Idle")
+            check("grbl-streamer resets it and reads where it is", machine.cmpos[0] == 2.2, machine.cmpos)
+            until("it reads the settings", lambda: any("$100=" in line for line in seen.get("on_read", ())) or machine.settings)
+            machine.send_immediately("$J=G90 X10.000 F6000")
+            until("it jogs", lambda: emulator.glass == 1000)
+            until("it reads where it went", lambda: machine.cmpos[0] == 10 and machine.cmode == "Idle")
+            check("it jogs to its target and reads that", True, machine.cmpos)
+            machine.send_immediately("$J=G91 X20.000 F600")
+            until("it moves", lambda: machine.cmpos[0] > 11)
+            machine.softreset()
+            standing = emulator.stands(0.5)
+            check("a reset stops it on the way", standing is not None and 1100 < standing < 3000, standing)
+            until("it is locked", lambda: machine.cmode == "Alarm")
+            machine.killalarm()
+            until("it is unlocked", lambda: machine.cmode == "Idle")
+            check("it is locked then, and unlocked", True)
+        finally:
+            machine.disconnect()
+
+
 def firmata():
     """`pyfirmata2` drives our model of a board, a motor and a potentiometer."""
     import pyfirmata2
@@ -244,6 +277,7 @@ def indi():
 CHECKS = {
     "moonlite": moonlite,
     "optotune": optotune,
+    "grbl": grbl,
     "firmata": firmata,
     "labjack-model": labjack_model,
     "labjack-driver": labjack_driver,

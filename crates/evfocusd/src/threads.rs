@@ -10,6 +10,7 @@
 
 pub(crate) mod camera;
 pub(crate) mod control;
+pub(crate) mod latency;
 pub(crate) mod lens;
 pub(crate) mod orders;
 

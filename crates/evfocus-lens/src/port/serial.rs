@@ -89,3 +89,25 @@ impl Transport for Serial {
         self.port.clear(ClearBuffer::Input).map_err(|error| self.lost("clear the input", &error))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_keeps_a_port_from_being_opened_has_its_remedy() {
+        let error = |kind, text: &str| explain_open("/dev/null", &serialport::Error::new(kind, text));
+        let denied = error(serialport::ErrorKind::Io(ErrorKind::PermissionDenied), "Permission denied");
+        assert_eq!(denied.kind, DeviceErrorKind::PermissionDenied);
+        assert!(denied.what.contains("dialout") && denied.device == "/dev/null", "{denied}");
+        let busy = error(serialport::ErrorKind::NoDevice, "Unable to acquire exclusive lock on serial port");
+        assert_eq!(busy.kind, DeviceErrorKind::Busy);
+        let other = error(serialport::ErrorKind::Io(ErrorKind::Other), "Not a typewriter");
+        assert_eq!(other.kind, DeviceErrorKind::Disconnected);
+        let missing = explain_open(
+            "/dev/ttyNOBODY",
+            &serialport::Error::new(serialport::ErrorKind::NoDevice, "No such file"),
+        );
+        assert!(missing.what.contains("no such port"), "{missing}");
+    }
+}

@@ -19,11 +19,15 @@ struct Daemon {
 
 impl Daemon {
     fn start() -> Self {
+        Self::start_with(Config::simulated().unwrap())
+    }
+
+    fn start_with(config: Config) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let config = Config {
             socket: folder.path().join("socket"),
             state_dir: folder.path().join("reports"),
-            ..Config::simulated().unwrap()
+            ..config
         };
         let again = config.clone();
         let reread = Box::new(move || Ok(again.clone()));
@@ -216,4 +220,24 @@ fn watching_ends_with_its_reader() {
     assert_eq!(status["mode"], "auto");
     drop(lines);
     assert_eq!(watch.wait().unwrap().code(), Some(0));
+}
+
+/// With a fast lens, so that it does not take long in real time.
+#[test]
+fn a_lens_is_calibrated_and_stays_so() {
+    let mut config = Config::simulated().unwrap();
+    config.rig.lens.max_speed = evfocus_core::LensSpeed::new(12_000.0).unwrap();
+    config.rig.lens.acceleration = 400_000.0;
+    let daemon = Daemon::start_with(config);
+    let known = daemon.json(&["calibrate", "lens", "--json"]);
+    assert!(known["lens"].as_str().unwrap().starts_with("simulated lens"), "{known}");
+    let speed = number(&known, "speed_counts_per_s");
+    assert!((speed - 12_000.0).abs() < 600.0, "{known}");
+    assert_eq!(daemon.json(&["status", "--json"])["calibration"], known);
+    assert!(stdout(&daemon.run(&["status"])).contains("counts/s"));
+    let kept = std::fs::read(daemon.folder.path().join("reports/lens-calibration.json")).unwrap();
+    assert_eq!(serde_json::from_slice::<Value>(&kept).unwrap(), known);
+    let devices = daemon.json(&["devices", "--probe", "/dev/ttyNOBODY", "--json"]);
+    let asked = devices.as_array().unwrap().iter().find(|device| device["location"] == "/dev/ttyNOBODY");
+    assert_eq!(asked.unwrap()["state"], "missing", "{devices}");
 }
