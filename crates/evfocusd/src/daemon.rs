@@ -125,8 +125,16 @@ impl Running {
         clock: &Arc<dyn Clock>,
     ) -> anyhow::Result<Self> {
         let (camera_info, lens_info) = (devices.camera.info(), devices.lens.info());
-        let Prepared { controller, access, store, rig_delay, run_devices, calibration, calibration_file, desk } =
-            Prepared::new(config, &camera_info, &lens_info, clock)?;
+        let Prepared {
+            controller,
+            access,
+            store,
+            rig_delay,
+            run_devices,
+            calibration,
+            calibration_file,
+            desk,
+        } = Prepared::new(config, &camera_info, &lens_info, clock)?;
         let ControllerConfig { delays: saved_delays, pace, limits, .. } = *controller.config();
 
         let (filled_in, filled_out) = RingBuffer::new(BATCHES);

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use evfocus_core::controller::{Accepted, Action, Command as CoreCommand, Input, Pace, Refusal, Snapshot};
 use evfocus_core::{
-    Controller, CurvePoint, DelayModel, EventBatch, Geometry, HostMicros, LensRange,
-    LensSample, RunId, RunReport,
+    Controller, CurvePoint, DelayModel, EventBatch, Geometry, HostMicros, LensRange, LensSample, RunId,
+    RunReport,
 };
 use evfocus_hal::Clock;
 use evfocus_ipc as ipc;
@@ -228,7 +228,9 @@ impl ControlThread {
         self.desk.configure(*config);
         match self.desk.settings() {
             Ok(settings) => drop(self.controller.reconfigure(settings)),
-            Err(error) => tracing::error!(%error, "the new settings do not suit the lens as it was calibrated"),
+            Err(error) => {
+                tracing::error!(%error, "the new settings do not suit the lens as it was calibrated")
+            }
         }
     }
 
