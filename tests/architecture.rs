@@ -53,7 +53,7 @@ const FENCES: [(&str, &[&str]); 8] = [
     ("nusb", &["evfocus-camera"]),
     ("tokio", &["evfocus-ipc", "evfocusd", "evfocus"]),
     ("serde", &["evfocus-eval", "evfocus-ipc", "evfocusd", "evfocus"]),
-    ("clap", &["evfocusd", "evfocus"]),
+    ("clap", &["evfocusd", "evfocus", "hil-sim"]),
     ("serialport", &["evfocus-lens"]),
     ("plotters", &["evfocus-eval", "evfocus"]),
     ("image", &["evfocus-eval"]),

@@ -38,4 +38,4 @@ pub use optics::{OpticsConfig, PointSpread};
 pub use rig::Rig;
 pub use scene::Scene;
 pub use sensor::{CameraModel, Light, Logarithm, PatchNoise, RateCap, SensorConfig};
-pub use usb::{EmulatedUsb, UsbFaults, UsbModel, UsbPort};
+pub use usb::{EmulatedUsb, Tally, UsbFaults, UsbModel, UsbPort, usbip};

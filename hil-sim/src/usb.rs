@@ -8,20 +8,26 @@
 //! large one.
 
 mod davis346;
+mod descriptors;
 mod device;
 mod evk4;
 mod faults;
+mod link;
+mod tally;
 mod transport;
+pub mod usbip;
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use evfocus_hal::usb::UsbError;
+use evfocus_hal::usb::{UsbError, UsbIdentity};
 
 use crate::camera::SimCamera;
 use crate::rig::Rig;
 use device::Device;
+use link::Link;
 
 pub use faults::UsbFaults;
+pub use tally::Tally;
 pub use transport::EmulatedUsb;
 
 /// Which camera is on the wire.
@@ -50,6 +56,9 @@ struct Shared {
     faults: UsbFaults,
     /// The data endpoint refuses until its halt is cleared.
     halted: bool,
+    is_plugged: bool,
+    /// Counts the times the cable was pulled: a connection of an earlier plug is dead.
+    plug: u32,
 }
 
 /// The lock, whatever a test that panicked has done with it.
@@ -65,6 +74,8 @@ impl Rig {
             camera: self.devices().0,
             faults: UsbFaults::default(),
             halted: false,
+            is_plugged: true,
+            plug: 0,
         };
         UsbPort { rig: self.clone(), model, shared: Arc::new(Mutex::new(shared)) }
     }
@@ -77,23 +88,55 @@ impl UsbPort {
     /// # Errors
     /// [`UsbError::Disconnected`] while it is unplugged.
     pub fn open(&self) -> Result<EmulatedUsb, UsbError> {
+        let (identity, link) = self.connect()?;
+        Ok(EmulatedUsb::new(identity, self.rig.clock(), link))
+    }
+
+    /// Pulls the camera's cable. Connections stay dead; what the camera knew is gone.
+    pub fn pull(&self) {
+        let mut shared = lock(&self.shared);
+        if shared.is_plugged {
+            shared.is_plugged = false;
+            shared.plug += 1;
+            self.power_up(&mut shared);
+        }
+    }
+
+    /// Puts the cable that was [pulled](Self::pull) in again.
+    pub fn push(&self) {
+        lock(&self.shared).is_plugged = true;
+    }
+
+    /// A connection to the device, and what the device says of itself.
+    fn connect(&self) -> Result<(UsbIdentity, Link), UsbError> {
         let mut shared = lock(&self.shared);
         if shared.camera.is_unplugged() {
-            let (mut camera, _) = self.rig.devices();
-            if camera.is_unplugged() {
-                return Err(UsbError::Disconnected);
-            }
-            shared.camera = camera;
-            shared.device = device::power_up(self.model, self.rig.config().seed);
-            shared.halted = false;
+            self.power_up(&mut shared);
+        }
+        if !shared.is_plugged || shared.camera.is_unplugged() {
+            return Err(UsbError::Disconnected);
         }
         let identity = shared.device.identity(&shared.faults);
-        Ok(EmulatedUsb::new(identity, self.rig.clock(), Arc::clone(&self.shared)))
+        drop(shared);
+        Ok((identity, Link::new(Arc::clone(&self.shared))))
+    }
+
+    /// Everything as it is after power-up.
+    fn power_up(&self, shared: &mut Shared) {
+        shared.camera = self.rig.devices().0;
+        shared.device = device::power_up(self.model, self.rig.config().seed);
+        shared.halted = false;
     }
 
     /// From now on, what goes wrong.
     pub fn set_faults(&self, faults: UsbFaults) {
         lock(&self.shared).faults = faults;
+    }
+
+    /// Sums over the first 2, 4, 8 and so on events that the camera has put into its stream, since the stream began or the host
+    /// reset the camera's time.
+    pub fn tallies(&self) -> Vec<Tally> {
+        lock(&self.shared).device.tallies().to_vec()
     }
 
     /// What a register of the device holds: of the DAVIS346 module and parameter, of the EVK4 zero and the address.

@@ -19,3 +19,4 @@ mod repeat;
 mod scenes;
 mod sensor;
 mod sweep;
+mod usbip;

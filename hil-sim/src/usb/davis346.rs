@@ -11,7 +11,9 @@ use evfocus_core::{CameraMicros, EventBatch};
 use evfocus_hal::usb::{UsbError, UsbIdentity, UsbSpeed, VendorRequest};
 
 use super::UsbFaults;
+use super::descriptors::{Description, Endpoint, Kind};
 use super::device::Device;
+use super::tally::{Tallies, Tally};
 use filters::Filters;
 use words::Words;
 
@@ -45,6 +47,18 @@ const PATCH: ((u8, u8), u32) = ((6, 7), 1);
 /// Words dropped because nobody read them: the high word, then the low one.
 const DROPPED: (u8, u8) = (0, 83);
 
+/// Data, and the firmware's messages for its makers, of which there are none.
+const ENDPOINTS: [Endpoint; 2] = [
+    Endpoint { address: 0x82, kind: Kind::Bulk, burst: 16 },
+    Endpoint { address: 0x81, kind: Kind::Interrupt, burst: 1 },
+];
+const DESCRIPTION: Description = Description {
+    manufacturer: "iniVation",
+    product: "DAVIS346",
+    class: [0xFF, 0, 0],
+    endpoints: &ENDPOINTS,
+};
+
 /// An emulated DAVIS346.
 #[derive(Debug)]
 pub(super) struct Davis346 {
@@ -52,6 +66,7 @@ pub(super) struct Davis346 {
     registers: BTreeMap<(u8, u8), u32>,
     words: Words,
     filters: Filters,
+    tallies: Tallies,
     /// When the device last sent a packet that was not full.
     packet_sent_us: i64,
     newest_us: i64,
@@ -66,6 +81,7 @@ impl Davis346 {
             registers: told.collect(),
             words: Words::default(),
             filters: Filters::default(),
+            tallies: Tallies::default(),
             packet_sent_us: 0,
             newest_us: 0,
             dropped: 0,
@@ -94,6 +110,7 @@ impl Davis346 {
         self.registers.insert((module, parameter), value);
         if resets {
             self.words.reset(self.newest_us);
+            self.tallies = Tallies::default();
         }
     }
 
@@ -114,6 +131,10 @@ impl Device for Davis346 {
             serial: self.serial.clone(),
             speed: Some(UsbSpeed::Super),
         }
+    }
+
+    fn description(&self) -> &'static Description {
+        &DESCRIPTION
     }
 
     fn control_in(
@@ -173,6 +194,7 @@ impl Device for Davis346 {
     fn begin(&mut self, now: CameraMicros) {
         self.words = Words::starting_at(now.0);
         self.filters = Filters::default();
+        self.tallies = Tallies::default();
         self.newest_us = now.0;
         self.packet_sent_us = now.0;
     }
@@ -190,6 +212,9 @@ impl Device for Davis346 {
                 let get = |parameter| registers.get(&(1, parameter)).copied().unwrap_or(0);
                 let passes = self.filters.pass(event, &get);
                 self.words.event(event, passes);
+                if passes {
+                    self.tallies.add(event, self.words.device_time(event.t.0));
+                }
             }
         }
         if let Some(reached) = batch.reached {
@@ -215,6 +240,10 @@ impl Device for Davis346 {
         if let Some(reached) = batch.reached {
             self.newest_us = reached.0;
         }
+    }
+
+    fn tallies(&self) -> &[Tally] {
+        self.tallies.kept()
     }
 
     fn register(&self, module: u8, address: u32) -> u32 {

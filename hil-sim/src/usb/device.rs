@@ -6,12 +6,15 @@ use evfocus_core::{CameraMicros, EventBatch};
 use evfocus_hal::usb::{UsbError, UsbIdentity, VendorRequest};
 
 use super::davis346::Davis346;
+use super::descriptors::Description;
 use super::evk4::Evk4;
+use super::tally::Tally;
 use super::{UsbFaults, UsbModel};
 
 /// An emulated device. Times are those of the simulated camera's clock.
 pub(super) trait Device: fmt::Debug + Send {
     fn identity(&self, faults: &UsbFaults) -> UsbIdentity;
+    fn description(&self) -> &'static Description;
     fn control_in(
         &mut self,
         request: VendorRequest,
@@ -34,6 +37,8 @@ pub(super) trait Device: fmt::Debug + Send {
     fn packet(&mut self) -> Option<Vec<u8>>;
     /// What `batch` holds cannot be sent.
     fn overflow(&mut self, batch: &EventBatch);
+    /// What the stream has carried, at 2, 4, 8 and so on events.
+    fn tallies(&self) -> &[Tally];
     fn register(&self, module: u8, address: u32) -> u32;
 }
 

@@ -10,7 +10,9 @@ use evfocus_core::{CameraMicros, EventBatch};
 use evfocus_hal::usb::{UsbError, UsbIdentity, UsbSpeed, VendorRequest};
 
 use super::UsbFaults;
+use super::descriptors::{Description, Endpoint, Kind};
 use super::device::Device;
+use super::tally::{Tallies, Tally};
 use filters::Filters;
 use power_up::POWER_UP;
 use words::Words;
@@ -30,6 +32,15 @@ const EINVAL: u32 = 22;
 /// The link's packets.
 const PACKET_BYTES: usize = 8192;
 
+/// The host takes them by their order: answers, requests, data.
+const ENDPOINTS: [Endpoint; 3] = [
+    Endpoint { address: ANSWERS, kind: Kind::Bulk, burst: 1 },
+    Endpoint { address: REQUESTS, kind: Kind::Bulk, burst: 1 },
+    Endpoint { address: DATA, kind: Kind::Bulk, burst: 16 },
+];
+const DESCRIPTION: Description =
+    Description { manufacturer: "Prophesee", product: "EVK4", class: [0xFF, 0x19, 0], endpoints: &ENDPOINTS };
+
 /// An emulated EVK4.
 #[derive(Debug)]
 pub(super) struct Evk4 {
@@ -38,6 +49,7 @@ pub(super) struct Evk4 {
     answers: VecDeque<Vec<u8>>,
     words: Words,
     filters: Filters,
+    tallies: Tallies,
 }
 
 impl Evk4 {
@@ -48,6 +60,7 @@ impl Evk4 {
             answers: VecDeque::new(),
             words: Words::default(),
             filters: Filters::default(),
+            tallies: Tallies::default(),
         }
     }
 
@@ -124,6 +137,10 @@ impl Device for Evk4 {
         }
     }
 
+    fn description(&self) -> &'static Description {
+        &DESCRIPTION
+    }
+
     fn control_in(
         &mut self,
         request: VendorRequest,
@@ -179,6 +196,7 @@ impl Device for Evk4 {
     fn begin(&mut self, now: CameraMicros) {
         self.words = Words::starting_at(now.0);
         self.filters = Filters::default();
+        self.tallies = Tallies::default();
     }
 
     fn send(&mut self, batch: &EventBatch) {
@@ -188,6 +206,7 @@ impl Device for Evk4 {
             self.words.advance(event.t.0);
             if self.filters.pass(event, &get) {
                 self.words.event(event);
+                self.tallies.add(event, self.words.told());
             }
         }
         self.words.end_run();
@@ -201,6 +220,10 @@ impl Device for Evk4 {
     }
 
     fn overflow(&mut self, _: &EventBatch) {}
+
+    fn tallies(&self) -> &[Tally] {
+        self.tallies.kept()
+    }
 
     fn register(&self, _: u8, address: u32) -> u32 {
         self.get(address)

@@ -38,9 +38,14 @@ impl Words {
         self.reset(now_us - now_us.rem_euclid(1 << TIME_BITS));
     }
 
+    /// What the device's clock shows when the simulated camera's shows `time_us`.
+    pub(super) fn device_time(&self, time_us: i64) -> i64 {
+        (time_us - self.origin_us).max(0)
+    }
+
     /// One wrap word for each wrap until `time_us`; one for all if there are many, as after a time in which nobody read.
     pub(super) fn advance(&mut self, time_us: i64) {
-        let wraps = (time_us - self.origin_us).max(0) >> TIME_BITS;
+        let wraps = self.device_time(time_us) >> TIME_BITS;
         let mut missing = wraps - self.wraps;
         if missing > 0 {
             (self.wraps, self.low, self.row) = (wraps, 0, None);
@@ -55,7 +60,7 @@ impl Words {
     /// An event; where a filter takes it away, its row stays.
     pub(super) fn event(&mut self, event: &Event, passes: bool) {
         self.advance(event.t.0);
-        let low = ((event.t.0 - self.origin_us).max(0) & 0x7FFF) as u16;
+        let low = (self.device_time(event.t.0) & 0x7FFF) as u16;
         if low != self.low {
             self.queue.push_back(0x8000 | low);
             (self.low, self.row) = (low, None);

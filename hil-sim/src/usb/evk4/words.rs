@@ -46,6 +46,11 @@ impl Words {
         Self { origin_us: now_us, ..Self::default() }
     }
 
+    /// Device time up to which everything is told.
+    pub(super) fn told(&self) -> i64 {
+        self.told_us
+    }
+
     fn put(&mut self, kind: u16, payload: u16) {
         self.queue.push_back(kind << 12 | payload & 0xFFF);
     }
