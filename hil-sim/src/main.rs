@@ -13,7 +13,9 @@ use evfocus_core::{Geometry, LensPosition};
 use evfocus_hal::{Clock, SystemClock};
 use hil_sim::usbip;
 use hil_sim::wire::{Protocol, Server, WireFault, WirePort};
-use hil_sim::{CameraModel, Light, MotionConfig, Rig, RigConfig, Scene, SensorConfig, UsbModel, UsbPort};
+use hil_sim::{
+    CameraModel, LensConfig, Light, MotionConfig, Rig, RigConfig, Scene, SensorConfig, UsbModel, UsbPort,
+};
 
 /// Between the two looks at the lens that tell whether it moves.
 const LOOK: Duration = Duration::from_millis(100);
@@ -29,7 +31,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Offer a rig until standard input ends. Orders, one a line: "unplug camera", "plug camera", "unplug lens", "plug lens",
-    /// "state" (where the glass is), "tally" (sums over the camera's first 2, 4, 8... events).
+    /// "state" (where the glass is), "tally N" (sums over the first N events that the camera sent; N is a power of two).
     Serve(Serve),
 }
 
@@ -44,6 +46,9 @@ struct Serve {
     /// Protocol of the lens: moonlite, optotune, grbl, firmata, labjack or indi.
     #[arg(long, value_name = "PROTOCOL")]
     lens: Option<Protocol>,
+    /// Serial port to offer the lens on; default: a new pseudo-terminal. Not for labjack and indi.
+    #[arg(long, value_name = "PATH", requires = "lens")]
+    lens_port: Option<String>,
     /// What the camera looks at.
     #[arg(long, default_value = "dead-leaves")]
     scene: Scene,
@@ -53,6 +58,9 @@ struct Serve {
     /// Lens position at which the scene is sharp, counts.
     #[arg(long, value_name = "COUNTS", default_value_t = 1985.0)]
     focus: f64,
+    /// Where the lens stands at first, counts.
+    #[arg(long, value_name = "COUNTS", default_value_t = 220.0)]
+    start: f64,
     /// Hand shake, pixels RMS.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     shake: f64,
@@ -91,6 +99,7 @@ impl Serve {
             sensor: SensorConfig { geometry, ..preset.sensor },
             scene: self.scene,
             focus: LensPosition(self.focus),
+            lens: LensConfig { start: LensPosition(self.start), ..preset.lens },
             motion: MotionConfig {
                 shake_px_rms: self.shake,
                 velocity_px_per_s: (self.velocity, 0.0),
@@ -118,14 +127,16 @@ impl Serve {
             )?;
         }
         let lens = self.lens.map(|protocol| (protocol, rig.wire(protocol)));
-        let server = lens.clone().map(|(protocol, port)| match protocol {
-            Protocol::MoonLite | Protocol::Optotune | Protocol::Grbl | Protocol::Firmata => Server::pty(port),
-            Protocol::LabJack | Protocol::Indi => Server::tcp(port),
+        let server = lens.clone().map(|(protocol, port)| match (protocol, &self.lens_port) {
+            (Protocol::LabJack | Protocol::Indi, _) => Server::tcp(port),
+            (_, Some(path)) => Server::serial(port, path),
+            (_, None) => Server::pty(port),
         });
         let server = server.transpose()?;
         if let Some(server) = &server {
             writeln!(out, "lens: {}", server.address())?;
         }
+        writeln!(out, "ready")?;
         out.flush()?;
         let bench = Bench { rig, clock, camera, lens: lens.map(|(_, port)| port) };
         for line in std::io::stdin().lock().lines() {
@@ -159,12 +170,18 @@ impl Bench {
                 let speed = (after - before) / LOOK.as_secs_f64();
                 return writeln!(out, "state: glass at {after:.1} counts, {speed:.0} counts/s");
             }
-            ("tally", Some(camera), _) => {
-                for tally in camera.tallies() {
-                    let hil_sim::Tally { events, on, x, y, t_us } = tally;
-                    writeln!(out, "tally: {events} events, {on} on, x {x}, y {y}, t {t_us}")?;
-                }
-                return Ok(());
+            (_, Some(camera), _) if order.starts_with("tally ") => {
+                let wanted = order.strip_prefix("tally ").and_then(|events| events.parse().ok());
+                let tallies = camera.tallies();
+                return match tallies.iter().find(|tally| Some(tally.events) == wanted) {
+                    Some(hil_sim::Tally { events, on, x, y, t_us }) => {
+                        writeln!(
+                            out,
+                            "tally: {events} events, {on} on, x {x}, y {y}, t since the first {t_us}"
+                        )
+                    }
+                    None => writeln!(out, "no tally of so many events: a power of two that have been sent"),
+                };
             }
             _ => return writeln!(out, "no such order: {order:?}"),
         }

@@ -466,7 +466,10 @@ impl Controller {
             return;
         }
         match self.state {
-            State::Resting { since } if now.since(since) >= self.config.rest => {
+            // A camera that has just been started may not have said anything yet.
+            State::Resting { since }
+                if now.since(since) >= self.config.rest && self.clock.newest().is_some() =>
+            {
                 self.sweep.end_rest(now.since(since));
                 self.begin_sweep(0, now, actions);
             }

@@ -334,7 +334,7 @@ impl fmt::Display for Failure {
             Self::LensLost => f.write_str("the lens is gone: check its cable, then restart evfocusd"),
             Self::LensFault => f.write_str("the lens reports a fault; the log has its words"),
             Self::LensSilent => f.write_str("the lens does not answer: check its cable and power"),
-            Self::CameraLost => f.write_str("the camera is gone: check its cable, then restart evfocusd"),
+            Self::CameraLost => f.write_str("the camera is gone: plug it in again, then focus again"),
             Self::CameraFault => f.write_str("the camera reports a fault; the log has its words"),
             Self::CameraSilent => f.write_str("the camera sends nothing, not even time: plug it in anew"),
             Self::ClockUnusable => f.write_str(

@@ -69,7 +69,7 @@ pub async fn run(
             "the simulated IMX636 is several times slower than real time, so runs will time out; use davis346 here"
         );
     }
-    if config.lens.is_hardware() {
+    if config.camera == CameraConfig::Simulated && config.lens.is_hardware() {
         tracing::warn!("the simulated camera does not look through this lens; it serves to try the lens");
     }
     let mut running = Running::start(&config, reread, devices, &clock)?;

@@ -6,12 +6,16 @@ use tracing_subscriber::EnvFilter;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
+/// What is logged unless asked otherwise. nusb calls errors what is none here, such as a camera in use being in use; those that
+/// are come back from its calls.
+const DEFAULT: &str = "info,nusb=off";
+
 /// Starts to log. `EVFOCUS_LOG` sets levels (`debug`, `evfocusd=trace`); default `info`.
 pub fn start() {
-    let wanted = std::env::var("EVFOCUS_LOG").unwrap_or_else(|_| "info".to_owned());
+    let wanted = std::env::var("EVFOCUS_LOG").unwrap_or_else(|_| DEFAULT.to_owned());
     let parsed = EnvFilter::try_new(&wanted);
     let mistake = parsed.as_ref().err().map(ToString::to_string);
-    let filter = parsed.unwrap_or_else(|_| EnvFilter::new("info"));
+    let filter = parsed.unwrap_or_else(|_| EnvFilter::new(DEFAULT));
     let registry = tracing_subscriber::registry().with(filter);
     // systemd sets JOURNAL_STREAM where standard error is the journal: then fields go there as fields.
     let journal = std::env::var_os("JOURNAL_STREAM").and_then(|_| tracing_journald::layer().ok());

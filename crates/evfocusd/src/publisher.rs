@@ -198,16 +198,15 @@ impl Publisher {
         let device = |ready: bool, name: &str| ready.then(|| name.to_owned());
         let missing = match (snapshot.camera_ready, snapshot.lens_ready) {
             (true, true) => None,
-            (false, true) => Some(
-                "the camera does not answer: check its cable, then restart evfocusd; the log has its words"
-                    .to_owned(),
-            ),
+            (false, true) => {
+                Some("the camera does not answer: check its cable; the log has its words".to_owned())
+            }
             (true, false) => {
                 Some("the lens does not answer: check its cable; the log has its words".to_owned())
             }
-            (false, false) => {
-                Some("neither camera nor lens answers: check their cables, then restart evfocusd".to_owned())
-            }
+            (false, false) => Some(
+                "neither camera nor lens answers: check their cables; the log has their words".to_owned(),
+            ),
         };
         Status {
             mode: wire::mode(snapshot.mode),

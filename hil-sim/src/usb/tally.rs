@@ -13,7 +13,7 @@ pub struct Tally {
     pub x: u64,
     /// Sum of their rows.
     pub y: u64,
-    /// Sum of their times, microseconds of the device.
+    /// Sum of their times since the first of them, microseconds.
     pub t_us: u64,
 }
 
@@ -21,6 +21,7 @@ pub struct Tally {
 #[derive(Debug, Default)]
 pub(super) struct Tallies {
     now: Tally,
+    first_us: i64,
     kept: Vec<Tally>,
 }
 
@@ -28,11 +29,14 @@ impl Tallies {
     /// An event has been put into the stream, with this device time.
     pub(super) fn add(&mut self, event: &Event, time_us: i64) {
         let now = &mut self.now;
+        if now.events == 0 {
+            self.first_us = time_us;
+        }
         now.events += 1;
         now.on += u64::from(event.polarity.is_on());
         now.x += u64::from(event.x);
         now.y += u64::from(event.y);
-        now.t_us += time_us.unsigned_abs();
+        now.t_us += (time_us - self.first_us).unsigned_abs();
         if now.events >= 2 && now.events.is_power_of_two() {
             self.kept.push(*now);
         }

@@ -35,15 +35,20 @@ impl Server {
         unlockpt(&master)?;
         let path = ptsname(&master, Vec::new())?.into_string().map_err(io::Error::other)?;
         // Held open: when the last client of a pseudo-terminal leaves, its other end breaks.
-        let kept = std::fs::File::options().read(true).write(true).open(&path)?;
-        let mut attributes = tcgetattr(&kept)?;
-        // Otherwise commands come back as answers.
-        attributes.make_raw();
-        tcsetattr(&kept, OptionalActions::Now, &attributes)?;
+        let kept = open_raw(&path)?;
         Self::start(path, move |stop| {
             let _kept = kept;
-            carry(&port, &master, stop);
+            carry_on(&port, &master, stop);
         })
+    }
+
+    /// Puts `port` on the serial port `path`, whose other end another program or machine has.
+    ///
+    /// # Errors
+    /// The operating system's, if there is no such serial port or it may not be opened.
+    pub fn serial(port: WirePort, path: &str) -> io::Result<Self> {
+        let file = open_raw(path)?;
+        Self::start(path.to_owned(), move |stop| carry_on(&port, &file, stop))
     }
 
     /// Puts `port` on a free TCP port of the loopback interface; one client at a time.
@@ -87,6 +92,30 @@ impl Drop for Server {
         if let Some(thread) = self.thread.take() {
             // A panic of the thread has been printed.
             thread.join().unwrap_or_default();
+        }
+    }
+}
+
+/// Opens a terminal that passes every byte as it is: otherwise commands come back as answers.
+fn open_raw(path: &str) -> io::Result<OwnedFd> {
+    let file = std::fs::File::options().read(true).write(true).open(path)?;
+    let mut attributes = tcgetattr(&file)?;
+    attributes.make_raw();
+    attributes.set_speed(115_200)?;
+    tcsetattr(&file, OptionalActions::Now, &attributes)?;
+    Ok(file.into())
+}
+
+/// Carries bytes whenever the cable is in, until the server is stopped.
+fn carry_on(port: &WirePort, file: &OwnedFd, stop: &AtomicBool) {
+    while !stop.load(Ordering::SeqCst) {
+        carry(port, file, stop);
+        // While the cable is out, what the host sends is lost.
+        if is_readable(file) && port.line().plug(port.now()).is_none() {
+            match rustix::io::read(file, &mut [0; 256]) {
+                Ok(0) | Err(_) => return,
+                Ok(_) => {}
+            }
         }
     }
 }

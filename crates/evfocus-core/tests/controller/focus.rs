@@ -7,7 +7,7 @@ use evfocus_core::{ControllerConfig, LensPosition, LensRange, Method, Outcome, P
 
 use Phase::{Approaching, Resting, Returning, Searching, Sweeping, ToStart, Verifying};
 
-use crate::rig::{LensFault, Rig, config};
+use crate::rig::{CameraFault, LensFault, Rig, config};
 
 fn focused_at(rig: &Rig) -> f64 {
     let Outcome::Focused { position } = rig.controller.report().unwrap().outcome else {
@@ -29,6 +29,18 @@ fn one_way_goes_through_its_phases_in_order() {
     let report = rig.controller.report().unwrap();
     assert_eq!((report.sweeps().count(), report.delay_us), (1, None));
     assert_eq!(report.elapsed(), report.phases.iter().sum::<Duration>());
+}
+
+#[test]
+fn a_camera_that_has_just_been_started_is_waited_for() {
+    let mut rig = Rig::with_silent_camera(config());
+    rig.focus();
+    rig.until(Resting);
+    rig.steps(300);
+    assert_eq!(rig.controller.snapshot().phase, Some(Resting), "longer than the rest");
+    rig.camera_fault = CameraFault::None;
+    rig.finish(|_, _| {});
+    focused_at(&rig);
 }
 
 #[test]

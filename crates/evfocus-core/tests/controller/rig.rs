@@ -133,6 +133,15 @@ impl Rig {
         rig
     }
 
+    /// A rig whose camera has not said anything yet.
+    pub(crate) fn with_silent_camera(config: ControllerConfig) -> Self {
+        let mut rig = Self::new(config);
+        rig.controller = Controller::new(rig.controller.config().clone(), GEOMETRY, rig.now);
+        rig.camera_fault = CameraFault::Silent;
+        rig.steps(20);
+        rig
+    }
+
     pub(crate) fn command(&mut self, command: Command) -> Result<Accepted, Refusal> {
         let answer = self.controller.command(command, self.now, &mut self.actions);
         self.carry_out();
