@@ -18,7 +18,7 @@ use filters::Filters;
 use words::Words;
 
 /// Module and parameter of what the logic tells and does not let one write, with the values told.
-const TOLD: [((u8, u8), u32); 17] = [
+const TOLD: [((u8, u8), u32); 21] = [
     // Statistics of what was dropped.
     ((0, 80), 1),
     // The pixels: columns, rows, axes exchanged; pixel, activity, window, skip and polarity filter, statistics.
@@ -31,6 +31,11 @@ const TOLD: [((u8, u8), u32); 17] = [
     ((1, 50), 1),
     ((1, 60), 1),
     ((1, 80), 0),
+    // The frames, of which none are sent: columns, rows, axes exchanged, global shutter.
+    ((2, 0), 260),
+    ((2, 1), 346),
+    ((2, 2), 4),
+    ((2, 6), 1),
     // The external input's generator.
     ((4, 10), 1),
     // Logic, chip B, time-stamp master, clocks of logic, converter and link in MHz.

@@ -17,7 +17,7 @@ PATIENCE_S = 120
 def main() -> None:
     wanted = int(sys.argv[1])
     for found in dv.io.camera.discover():
-        print("found", found)
+        print("found", found.cameraModel, found.serialNumber)
     camera = dv.io.camera.open()
     print("opened", camera.getCameraName(), camera.getEventResolution())
     columns = {name: numpy.zeros(0, dtype=numpy.int64) for name in ("t", "x", "y", "p")}
@@ -33,13 +33,12 @@ def main() -> None:
         new = {"t": events["timestamp"], "x": events["x"], "y": events["y"], "p": events["polarity"]}
         for name, values in new.items():
             columns[name] = numpy.concatenate([columns[name], values.astype(numpy.int64)])
-    # Its times count from the computer's clock at the camera's reset: made relative to the first event.
-    first = int(columns["t"][0])
+    # Its times count from the computer's clock at the camera's reset.
+    columns["t"] -= columns["t"][0]
     count = 2
     while count <= wanted:
         sums = {name: int(values[:count].sum()) for name, values in columns.items()}
-        times = sums["t"] - first * count
-        print(f"tally: {count} events, {sums['p']} on, x {sums['x']}, y {sums['y']}, t since the first {times}")
+        print(f"tally: {count} events, {sums['p']} on, x {sums['x']}, y {sums['y']}, t since the first {sums['t']}")
         count *= 2
 
 
