@@ -1,6 +1,6 @@
 """Runs a scenario in the virtual rig and judges by what the guest prints.
 
-usage: rig.py SCENARIO --camera CAMERA [--out FOLDER] [--bin FOLDER] [--seconds N]
+usage: rig.py SCENARIO --camera CAMERA [--root FOLDER --package DEB] [--out FOLDER] [--bin FOLDER] [--seconds N]
 
 The guest is a machine with Debian's stock kernel in QEMU, in software. Its time goes with its instructions (-icount) where it is
 busy, so that a slow or busy host makes it take longer and not late. The emulated devices run in it too, so they live in the same
@@ -23,8 +23,11 @@ TARGET = HERE.parent.parent / "target"
 
 def qemu(out: pathlib.Path, words: dict[str, str], memory: int, shift: int, work: str) -> list[str]:
     append = ["console=ttyS0 quiet panic=-1 mitigations=off", *(f"rig.{key}={value}" for key, value in words.items())]
+    if "root" in words:
+        append += ["systemd.unit=multi-user.target", "systemd.wants=rig.service", "systemd.show_status=0"]
+        append += [f"systemd.mask={unit}" for unit in ("serial-getty@ttyS0.service", "getty@tty1.service")]
     share = "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap"
-    command = ["qemu-system-x86_64", "-M", "q35", "-accel", "tcg", "-icount", f"shift={shift},sleep=on", "-rtc", "clock=vm"]
+    command = ["qemu-system-x86_64", "-M", "q35", "-accel", "tcg", "-icount", f"shift={shift},sleep=off", "-rtc", "clock=vm"]
     command += ["-cpu", "max", "-m", str(memory), "-nodefaults", "-nographic", "-no-reboot", "-virtfs", share]
     # The first serial port is the console, the second the other end of the USB serial adapter.
     command += ["-serial", "stdio", "-chardev", f"socket,id=adapter,path={work}/lens,server=on,wait=off"]
@@ -39,6 +42,8 @@ def main() -> int:
     parser.add_argument("--camera", required=True)
     parser.add_argument("--out", type=pathlib.Path, default=TARGET / "rig")
     parser.add_argument("--bin", type=pathlib.Path, default=TARGET / "release")
+    parser.add_argument("--root", type=pathlib.Path, help="a Debian system with systemd and udev that the guest is to start")
+    parser.add_argument("--package", type=pathlib.Path, help="the package that is to be installed in it")
     parser.add_argument("--memory", type=int, default=1024, help="of the guest, MiB")
     parser.add_argument("--shift", type=int, default=2, help="an instruction takes 2 to the power of this, ns")
     parser.add_argument("--seconds", type=float, default=300, help="longest time of the guest")
@@ -51,6 +56,8 @@ def main() -> int:
         "witness": arguments.out / "witness/release",
         "python": sys.executable,
     }
+    if arguments.root:
+        words |= {"root": arguments.root.resolve(), "package": arguments.package.resolve()}
     began = time.monotonic()
     transcript = []
     with tempfile.TemporaryDirectory() as work:
