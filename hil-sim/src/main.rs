@@ -14,7 +14,8 @@ use evfocus_hal::{Clock, SystemClock};
 use hil_sim::usbip;
 use hil_sim::wire::{Protocol, Server, WireFault, WirePort};
 use hil_sim::{
-    CameraModel, LensConfig, Light, MotionConfig, Rig, RigConfig, Scene, SensorConfig, UsbModel, UsbPort,
+    CameraModel, LensConfig, Light, MotionConfig, OpticsConfig, Rig, RigConfig, Scene, SensorConfig,
+    UsbModel, UsbPort,
 };
 
 /// Between the two looks at the lens that tell whether it moves.
@@ -61,6 +62,9 @@ struct Serve {
     /// Where the lens stands at first, counts.
     #[arg(long, value_name = "COUNTS", default_value_t = 220.0)]
     start: f64,
+    /// Blur, pixels for each count away from focus. Default: a lens of the same focal length and aperture before each camera.
+    #[arg(long, value_name = "PIXELS")]
+    blur: Option<f64>,
     /// Hand shake, pixels RMS.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     shake: f64,
@@ -95,7 +99,9 @@ impl Serve {
         };
         let preset = RigConfig::preset(model, Light::Light);
         let geometry = self.pixels.unwrap_or(preset.sensor.geometry);
+        let blur_px_per_count = self.blur.unwrap_or(preset.optics.blur_px_per_count);
         RigConfig {
+            optics: OpticsConfig { blur_px_per_count, ..preset.optics },
             sensor: SensorConfig { geometry, ..preset.sensor },
             scene: self.scene,
             focus: LensPosition(self.focus),

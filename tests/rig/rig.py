@@ -27,7 +27,7 @@ def qemu(out: pathlib.Path, words: dict[str, str], memory: int, shift: int, work
         append += ["systemd.unit=multi-user.target", "systemd.wants=rig.service", "systemd.show_status=0"]
         append += [f"systemd.mask={unit}" for unit in ("serial-getty@ttyS0.service", "getty@tty1.service")]
     share = "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap"
-    command = ["qemu-system-x86_64", "-M", "q35", "-accel", "tcg", "-icount", f"shift={shift},sleep=off", "-rtc", "clock=vm"]
+    command = ["qemu-system-x86_64", "-M", "q35", "-accel", "tcg", "-icount", f"shift={shift},sleep=on", "-rtc", "clock=vm"]
     command += ["-cpu", "max", "-m", str(memory), "-nodefaults", "-nographic", "-no-reboot", "-virtfs", share]
     # The first serial port is the console, the second the other end of the USB serial adapter.
     command += ["-serial", "stdio", "-chardev", f"socket,id=adapter,path={work}/lens,server=on,wait=off"]
@@ -45,7 +45,7 @@ def main() -> int:
     parser.add_argument("--root", type=pathlib.Path, help="a Debian system with systemd and udev that the guest is to start")
     parser.add_argument("--package", type=pathlib.Path, help="the package that is to be installed in it")
     parser.add_argument("--memory", type=int, default=1024, help="of the guest, MiB")
-    parser.add_argument("--shift", type=int, default=2, help="an instruction takes 2 to the power of this, ns")
+    parser.add_argument("--shift", type=int, default=0, help="an instruction takes 2 to the power of this, ns")
     parser.add_argument("--seconds", type=float, default=300, help="longest time of the guest")
     arguments = parser.parse_args()
 
