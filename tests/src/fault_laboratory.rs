@@ -31,6 +31,10 @@ use judge::Judge;
 const GEOMETRY: Geometry = Geometry { width: 48, height: 36 };
 /// When the run is triggered, after the second that the rig takes to start.
 const TRIGGER: Duration = Duration::from_millis(1500);
+/// What the service manager waits before it tries to start the process again.
+const RESTART: Duration = Duration::from_secs(2);
+/// A fault that ends lasts no longer than this.
+const LONGEST_SPELL: Duration = Duration::from_secs(8);
 /// Nothing new goes wrong after this.
 const LAST_FAULT: Duration = Duration::from_secs(9);
 
@@ -253,7 +257,14 @@ impl Life {
         let (low, high) = (config.rig.lens.range.min().0, config.rig.lens.range.max().0);
         config.rig.lens.start = LensPosition(self.rig.rig().glass(self.rig.now()).0.clamp(low, high));
         config.rig.faults.clear();
-        Self::begin(trial, &config, self.now())
+        // A camera that is away keeps the process from starting; the service manager tries again.
+        let mut start = self.now();
+        loop {
+            match Self::begin(trial, &config, start) {
+                Err(_) if start < at(LAST_FAULT) + LONGEST_SPELL => start = start + RESTART,
+                begun => return begun,
+            }
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use evfocus_hal::{CameraInfo, Clock, LensInfo, SystemClock};
 use evfocus_ipc::server::Limits;
 use evfocus_ipc::{self as ipc, Device, Error, Report, Status};
 use rtrb::RingBuffer;
+use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{broadcast, mpsc, watch};
 use tokio::task::JoinSet;
 
@@ -56,6 +57,8 @@ pub async fn run(
     ready: impl FnOnce(),
     shutdown: impl Future<Output = ()>,
 ) -> anyhow::Result<()> {
+    // From here on SIGHUP does not end the process; one that comes too early is heeded once all runs.
+    let hangups = signal(SignalKind::hangup()).context("cannot listen for SIGHUP")?;
     let socket =
         match supervisor::inherited_socket().context("the socket handed over by the service manager")? {
             Some(listener) => ipc::server::Socket::inherited(listener)?,
@@ -74,13 +77,13 @@ pub async fn run(
     }
     let mut running = Running::start(&config, reread, devices, &clock)?;
     let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());
+    let scrapers = running.serve_metrics(&config)?;
     running.wait_for_the_lens().await;
     tracing::info!(socket = %config.socket.display(), state_dir = %config.state_dir.display(), "ready");
     ready();
     supervisor::ready();
     let supervision = tokio::spawn(running.supervisor().run());
-    let scrapers = running.serve_metrics(&config)?;
-    let hangups = tokio::spawn(reload::on_hangup(Arc::clone(&running.handle.lookups)));
+    let hangups = tokio::spawn(reload::on_hangup(hangups, Arc::clone(&running.handle.lookups)));
     let handle = running.handle.clone();
     let threads_alive = running.ended.recv();
     let mut died = false;

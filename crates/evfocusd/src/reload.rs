@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use evfocus_hal::LensInfo;
 use evfocus_ipc::Error;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::Signal;
 use tokio::sync::{mpsc, watch};
 
 use crate::access::Access;
@@ -110,8 +110,7 @@ fn names(changes: &[(&str, bool)]) -> Vec<String> {
 }
 
 /// Reloads at each SIGHUP, for ever.
-pub(crate) async fn on_hangup(lookups: Arc<dyn Lookups>) -> std::io::Result<()> {
-    let mut hangups = signal(SignalKind::hangup())?;
+pub(crate) async fn on_hangup(mut hangups: Signal, lookups: Arc<dyn Lookups>) -> std::io::Result<()> {
     while hangups.recv().await.is_some() {
         let lookups = Arc::clone(&lookups);
         // What is wrong has been logged.

@@ -136,3 +136,65 @@ impl Judge {
         Ended { outcomes: self.outcomes, broken: self.broken }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use evfocus_core::controller::FocusRequest;
+    use evfocusd::Config;
+    use evfocusd::devices::Devices;
+
+    use super::super::devices::{FaultyCamera, FaultyLens};
+    use super::*;
+
+    fn rig() -> (VirtualRig, Arc<Witness>) {
+        let mut config = Config::simulated().unwrap();
+        config.rig.sensor.geometry = super::super::GEOMETRY;
+        let witness = Arc::new(Witness::new(config.rig.lens.range));
+        let rig = VirtualRig::with_devices(&config, |rig, clock| {
+            let (camera, lens) = rig.devices();
+            Ok(Devices {
+                camera: Box::new(FaultyCamera::new(
+                    camera,
+                    Vec::new(),
+                    Arc::clone(&clock),
+                    Arc::clone(&witness),
+                )),
+                lens: Box::new(FaultyLens::new(lens, Vec::new(), clock, Arc::clone(&witness))),
+            })
+        });
+        (rig.unwrap(), witness)
+    }
+
+    #[test]
+    fn a_lens_that_moves_with_nobody_wanting_it_is_noticed() {
+        let ((mut rig, witness), mut judge) = (rig(), Judge::default());
+        for _ in 0..3_000 {
+            rig.step();
+            judge.watch(&rig, &witness, Duration::ZERO);
+        }
+        assert!(judge.broken.is_empty(), "{:?}", judge.broken);
+        // Behind the judge's back.
+        let far = rig.rig().config().lens.range.max();
+        rig.command(Command::MoveTo(far)).unwrap();
+        for _ in 0..200 {
+            rig.step();
+            judge.watch(&rig, &witness, Duration::ZERO);
+        }
+        assert!(judge.broken.iter().any(|what| what.contains("nobody wanting it")), "{:?}", judge.broken);
+    }
+
+    #[test]
+    fn events_that_were_not_counted_and_runs_without_a_report_are_noticed() {
+        let ((mut rig, _), mut judge) = (rig(), Judge::default());
+        rig.run_for(Duration::from_millis(300));
+        judge.count(&rig, &Witness::new(rig.rig().config().lens.range));
+        assert!(judge.broken.iter().any(|what| what.contains("were counted")), "{:?}", judge.broken);
+        rig.command(Command::Focus(FocusRequest::default())).unwrap();
+        rig.command(Command::Abort).unwrap();
+        judge.run = Some((RunId(77), rig.now()));
+        judge.note_end(&rig);
+        assert!(judge.broken.iter().any(|what| what.contains("without a report")), "{:?}", judge.broken);
+    }
+}
