@@ -261,7 +261,7 @@ impl Life {
         let mut start = self.now();
         loop {
             match Self::begin(trial, &config, start) {
-                Err(_) if start < at(LAST_FAULT) + LONGEST_SPELL => start = start + RESTART,
+                Err(_) if start < at(LAST_FAULT) + LONGEST_SPELL => start += RESTART,
                 begun => return begun,
             }
         }

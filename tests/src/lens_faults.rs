@@ -102,7 +102,9 @@ pub fn open_error(lens: &EmulatedLens, opening: Opening) -> Result<DeviceError> 
             wire.strike(match opening {
                 Opening::Silence => WireFault::Silence,
                 Opening::WrongBaud => WireFault::Garbage,
-                _ => WireFault::WrongBit,
+                Opening::NoSuchPort | Opening::InUse | Opening::OtherDevice | Opening::WrongBits => {
+                    WireFault::WrongBit
+                }
             });
             port(&wire)
         }
@@ -304,7 +306,7 @@ fn moved_on(rig: &Rig, struck: HostMicros, end: HostMicros) -> Duration {
     let (mut time, mut moved) = (struck, struck);
     while time < end && time.since(moved) < STANDSTILL {
         let before = rig.glass(time);
-        time = time + step;
+        time += step;
         if rig.glass(time).distance(before) > 0.02 {
             moved = time;
         }

@@ -75,10 +75,12 @@ fn asked(device: Device) -> Device {
             Device { message, ..device }
         }
         Err(error) => {
-            let state = match error.kind {
-                DeviceErrorKind::Busy => DeviceState::Busy,
-                DeviceErrorKind::PermissionDenied => DeviceState::PermissionDenied,
-                _ => device.state,
+            let state = if error.kind == DeviceErrorKind::Busy {
+                DeviceState::Busy
+            } else if error.kind == DeviceErrorKind::PermissionDenied {
+                DeviceState::PermissionDenied
+            } else {
+                device.state
             };
             Device { state, message: Some(error.what), ..device }
         }

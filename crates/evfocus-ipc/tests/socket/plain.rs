@@ -52,7 +52,11 @@ impl Service for Plain {
             // Never answered.
             (Request::Focus(_), _) => std::future::pending().await,
             (
-                Request::SetMode { .. } | Request::GetReport { .. } | Request::ListDevices | Request::Reload,
+                Request::SetMode { .. }
+                | Request::GetReport { .. }
+                | Request::ListDevices { .. }
+                | Request::Calibrate
+                | Request::Reload,
                 _,
             ) => Ok(Reply::Done {}),
         }

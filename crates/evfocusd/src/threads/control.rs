@@ -229,7 +229,7 @@ impl ControlThread {
         match self.desk.settings() {
             Ok(settings) => drop(self.controller.reconfigure(settings)),
             Err(error) => {
-                tracing::error!(%error, "the new settings do not suit the lens as it was calibrated")
+                tracing::error!(%error, "the new settings do not suit the lens as it was calibrated");
             }
         }
     }

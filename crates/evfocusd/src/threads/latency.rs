@@ -12,6 +12,7 @@ use rtrb::RingBuffer;
 use super::NOTICES;
 use super::lens::{LensThread, SAMPLES};
 use super::orders::orders;
+use crate::vitals::Vitals;
 
 /// An answer that takes longer than this will not come.
 const LOST: Duration = Duration::from_secs(5);
@@ -72,6 +73,7 @@ pub fn command_latency(lens: Box<dyn Lens>, poll: Duration, count: usize) -> Vec
         samples,
         notices,
         control: std::thread::current(),
+        vitals: Vitals::default(),
     };
     let thread = std::thread::spawn(move || thread.run());
     let mut latencies = Vec::with_capacity(count);
