@@ -46,7 +46,7 @@ def main() -> int:
     parser.add_argument("--package", type=pathlib.Path, help="the package that is to be installed in it")
     parser.add_argument("--memory", type=int, default=1024, help="of the guest, MiB")
     parser.add_argument("--shift", type=int, default=0, help="an instruction takes 2 to the power of this, ns")
-    parser.add_argument("--seconds", type=float, default=300, help="longest time of the guest")
+    parser.add_argument("--seconds", type=float, default=600, help="longest time of the guest")
     arguments = parser.parse_args()
 
     words = {
@@ -69,13 +69,14 @@ def main() -> int:
         watchdog.start()
         for line in guest.stdout:
             transcript.append(f"{time.monotonic() - began:7.2f}  {line.rstrip()}")
-            print(transcript[-1], flush=True)
         guest.wait()
         watchdog.cancel()
     log = arguments.out / f"{arguments.scenario}-{arguments.camera}.log"
     log.write_text("\n".join(transcript) + "\n")
     passed = any("finished, 0 failed" in line for line in transcript)
-    print(f"{arguments.scenario} with {arguments.camera}: {'passed' if passed else 'FAILED'}; transcript in {log}")
+    # In one piece: others may run beside.
+    transcript.append(f"{arguments.scenario} with {arguments.camera}: {'passed' if passed else 'FAILED'}; transcript in {log}")
+    print("\n".join(transcript), flush=True)
     return 0 if passed else 1
 
 
