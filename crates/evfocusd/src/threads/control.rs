@@ -227,7 +227,10 @@ impl ControlThread {
         let Some(config) = self.new_settings.take() else { return };
         self.desk.configure(*config);
         match self.desk.settings() {
-            Ok(settings) => drop(self.controller.reconfigure(settings)),
+            // No run is under way.
+            Ok(settings) => {
+                self.controller.reconfigure(settings);
+            }
             Err(error) => {
                 tracing::error!(%error, "the new settings do not suit the lens as it was calibrated");
             }
