@@ -12,12 +12,20 @@ const ARROWS: [(&str, &[&str]); 11] = [
     ("evfocus-hal", &["evfocus-core"]),
     ("evfocus-camera", &["evfocus-core", "evfocus-hal"]),
     ("evfocus-lens", &["evfocus-core", "evfocus-hal"]),
-    ("evfocus-record", &["evfocus-core"]),
+    ("evfocus-record", &["evfocus-core", "evfocus-hal"]),
     ("hil-sim", &["evfocus-core", "evfocus-hal"]),
     ("evfocus-eval", &["evfocus-core", "evfocus-hal", "evfocus-record", "hil-sim"]),
     (
         "evfocusd",
-        &["evfocus-camera", "evfocus-core", "evfocus-hal", "evfocus-ipc", "evfocus-lens", "hil-sim"],
+        &[
+            "evfocus-camera",
+            "evfocus-core",
+            "evfocus-hal",
+            "evfocus-ipc",
+            "evfocus-lens",
+            "evfocus-record",
+            "hil-sim",
+        ],
     ),
     (
         "evfocus",

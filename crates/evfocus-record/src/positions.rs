@@ -3,8 +3,8 @@
 //!
 //! Not its job: judging whether the positions cover a recording or move at all.
 
-use std::fmt::Write as _;
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use evfocus_core::{CameraMicros, LensPosition, LensTrace};
@@ -56,13 +56,70 @@ pub fn read(path: impl AsRef<Path>) -> Result<LensTrace<CameraMicros>, RecordErr
 /// # Errors
 /// [`RecordError::Write`] if the system refuses.
 pub fn write(path: impl AsRef<Path>, trace: &LensTrace<CameraMicros>) -> Result<(), RecordError> {
-    let mut text = format!("{HEADER}\n");
-    for (CameraMicros(time), LensPosition(position)) in trace.samples() {
-        // Writing to a string cannot fail; the shortest form that reads back as the same number.
-        let _infallible = writeln!(text, "{time},{position}");
+    let mut writer = PositionsWriter::create(path)?;
+    trace.samples().try_for_each(|(time, position)| writer.write(time, position))?;
+    writer.finish()
+}
+
+/// Writes a positions file sample by sample.
+#[derive(Debug)]
+pub struct PositionsWriter {
+    path: PathBuf,
+    file: BufWriter<File>,
+    last: Option<CameraMicros>,
+}
+
+impl PositionsWriter {
+    /// Creates the file, or empties it.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if the system refuses.
+    pub fn create(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        let path = path.as_ref().to_owned();
+        let create = || {
+            let mut file = BufWriter::new(File::create(&path)?);
+            writeln!(file, "{HEADER}")?;
+            Ok(file)
+        };
+        match create() {
+            Ok(file) => Ok(Self { path, file, last: None }),
+            Err(source) => Err(RecordError::Write { path, source }),
+        }
     }
-    let path = path.as_ref();
-    fs::write(path, text).map_err(|source| RecordError::Write { path: PathBuf::from(path), source })
+
+    /// Appends a sample, in the shortest form that reads back as the same number. One that is not later than the last is no
+    /// news and is left out.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if the system refuses.
+    pub fn write(&mut self, time: CameraMicros, position: LensPosition) -> Result<(), RecordError> {
+        if self.last.is_some_and(|last| time <= last) {
+            return Ok(());
+        }
+        self.last = Some(time);
+        let written = writeln!(self.file, "{},{}", time.0, position.0);
+        written.map_err(|source| self.error(source))
+    }
+
+    /// Hands what was written to the system.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if it refuses.
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        self.file.flush().map_err(|source| self.error(source))
+    }
+
+    /// Writes what is still held back and closes the file.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if the system refuses.
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        self.flush()
+    }
+
+    fn error(&self, source: io::Error) -> RecordError {
+        RecordError::Write { path: self.path.clone(), source }
+    }
 }
 
 const REMEDY: &str = "write the time in whole microseconds, a comma and the position in counts, oldest first";

@@ -64,6 +64,14 @@ impl Evt3Writer {
         encoded.map_err(|source| RecordError::Encode { path: self.path.clone(), source })
     }
 
+    /// Hands what was written to the system, so that it outlives this program.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if it refuses.
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        self.file.flush().map_err(|source| RecordError::Write { path: self.path.clone(), source })
+    }
+
     /// Writes what is still held back and closes the file. Without this call the end of the recording may be missing.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! Options and values that several subcommands take.
 
 mod choice;
+mod config;
 mod duration;
 mod position;
 mod rig;
@@ -8,6 +9,7 @@ mod socket;
 mod window;
 
 pub use choice::choices;
+pub use config::ConfigArguments;
 pub use duration::duration;
 pub use position::{position, speed};
 pub use rig::RigArguments;

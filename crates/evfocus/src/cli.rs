@@ -4,7 +4,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
     abort, analyze, calibrate, completions, demo, devices, doctor, eval, focus, info, man, measure, mode,
-    move_lens, reload, report, simulate, status, watch,
+    move_lens, record, reload, replay, report, simulate, status, watch,
 };
 use crate::exit::Exit;
 
@@ -43,6 +43,8 @@ enum Command {
     Reload(reload::Arguments),
     Analyze(analyze::Arguments),
     Info(info::Arguments),
+    Record(record::Arguments),
+    Replay(replay::Arguments),
     Simulate(simulate::Arguments),
     Demo(demo::Arguments),
     Eval(eval::Arguments),
@@ -69,6 +71,8 @@ impl Cli {
             Command::Reload(arguments) => reload::run(&arguments),
             Command::Analyze(arguments) => analyze::run(&arguments),
             Command::Info(arguments) => info::run(&arguments),
+            Command::Record(arguments) => record::run(&arguments),
+            Command::Replay(arguments) => replay::run(&arguments),
             Command::Simulate(arguments) => simulate::run(&arguments),
             Command::Demo(arguments) => demo::run(&arguments),
             Command::Eval(arguments) => eval::run(&arguments),

@@ -92,6 +92,11 @@ pub fn warn(text: &str) {
     to_stderr(&format!("warning: {text}"));
 }
 
+/// Tells on standard error what goes on, for whoever waits.
+pub fn say(text: &str) {
+    to_stderr(text);
+}
+
 fn to_stderr(line: &str) {
     // Where standard error is gone there is nobody left to tell.
     drop(writeln!(io::stderr(), "{line}"));

@@ -226,12 +226,13 @@ impl Config {
         // first run.
         if let Some(lens) = config.lens.expected(&config.rig) {
             let controller = config.controller(&lens, None)?;
-            let geometry = config.camera.geometry(config.rig.sensor.geometry);
-            FocusRequest::default().resolve(&controller, geometry).map_err(|refusal| {
-                let is_interval = matches!(refusal, Refusal::Interval { .. });
-                let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
-                BadValue::new(key, "not fit for a default run", refusal.to_string())
-            })?;
+            if let Some(geometry) = config.camera.geometry(config.rig.sensor.geometry) {
+                FocusRequest::default().resolve(&controller, geometry).map_err(|refusal| {
+                    let is_interval = matches!(refusal, Refusal::Interval { .. });
+                    let key = if is_interval { "focus.interval_ms" } else { "focus.longest_sweep_s" };
+                    BadValue::new(key, "not fit for a default run", refusal.to_string())
+                })?;
+            }
         }
         Ok(config)
     }

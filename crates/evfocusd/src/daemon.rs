@@ -72,8 +72,8 @@ pub async fn run(
             "the simulated IMX636 is several times slower than real time, so runs will time out; use davis346 here"
         );
     }
-    if config.camera == CameraConfig::Simulated && config.lens.is_hardware() {
-        tracing::warn!("the simulated camera does not look through this lens; it serves to try the lens");
+    if config.lens.is_hardware() && config.camera.driver().is_none() {
+        tracing::warn!("this camera does not look through this lens; it serves to try the lens");
     }
     let mut running = Running::start(&config, reread, devices, &clock)?;
     let publisher = tokio::spawn(running.publisher.take().context("the publisher has been taken")?.run());

@@ -4,17 +4,13 @@ use evfocus_camera::{Access, Driver, FoundCamera, discovery, usb};
 use evfocus_hal::{CameraInfo, LensInfo};
 use evfocus_ipc::{Device, DeviceRole, DeviceState, Status};
 
-use crate::config::{Config, LensBackend};
+use crate::config::{CameraConfig, Config, LensBackend};
 use crate::serial_ports;
-
-/// Driver and location of a camera that the simulated rig stands in for.
-const SIMULATED: &str = "simulated";
 
 /// The devices in use.
 #[derive(Debug)]
 pub(crate) struct DeviceList {
-    /// `None`: simulated.
-    camera_driver: Option<Driver>,
+    camera_config: CameraConfig,
     camera: CameraInfo,
     lens_backend: LensBackend,
     lens: LensInfo,
@@ -24,23 +20,24 @@ impl DeviceList {
     /// The devices that `config` names.
     pub(crate) fn new(config: &Config, camera: CameraInfo, lens: LensInfo) -> Self {
         let lens_backend = config.lens.clone();
-        Self { camera_driver: config.camera.driver(), camera, lens_backend, lens }
+        Self { camera_config: config.camera.clone(), camera, lens_backend, lens }
     }
 
     /// The devices in use and those that are attached. Asks the attached ones, which may take its time; what answers on the serial
     /// ports of `probe`, or on those on USB if it is empty, only if it is there.
     pub(crate) fn list(&self, status: &Status, probe: Option<&[String]>) -> Vec<Device> {
         let mut attached = attached();
-        let location = match self.camera_driver {
-            None => Some(SIMULATED.to_owned()),
-            Some(driver) => take_out(&mut attached, (driver, &self.camera.serial)),
+        let location = match (&self.camera_config, self.camera_config.driver()) {
+            (CameraConfig::Replay { file, .. }, _) => Some(file.display().to_string()),
+            (_, Some(driver)) => take_out(&mut attached, (driver, &self.camera.serial)),
+            (_, None) => Some(self.camera_config.name()),
         };
         let state = |is_there: bool| if is_there { DeviceState::Active } else { DeviceState::Missing };
         let message = |is_there: bool| if is_there { None } else { status.fault.clone() };
         let (camera_is_there, lens_is_there) = (status.camera.is_some(), status.lens.is_some());
         let camera = Device {
             role: DeviceRole::Camera,
-            driver: self.camera_driver.map_or_else(|| SIMULATED.to_owned(), |driver| driver.to_string()),
+            driver: self.camera_config.name(),
             model: self.camera.model.clone(),
             serial: self.camera.serial.clone(),
             location: location.unwrap_or_default(),
@@ -134,6 +131,12 @@ mod tests {
         assert_eq!(denied.state, DeviceState::PermissionDenied);
         let message = denied.message.unwrap();
         assert!(message.contains("udev rule") && message.contains("USB 3"), "{message}");
+        let busy = device(found(Driver::Evk4, "7", Access::Busy));
+        assert_eq!(busy.state, DeviceState::Busy);
+        assert!(busy.message.unwrap().contains("another program has it"));
+        let faulty = device(found(Driver::Evk4, "7", Access::Faulty("system number 0x00".to_owned())));
+        assert_eq!(faulty.state, DeviceState::Missing);
+        assert!(faulty.message.unwrap().contains("system number 0x00"));
         let free = found(Driver::Davis346, "7", Access::Free);
         let fast = device(FoundCamera { speed: Some(UsbSpeed::Super), ..free });
         assert_eq!(

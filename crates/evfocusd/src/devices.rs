@@ -9,6 +9,7 @@ use evfocus_camera::{Driver, ReopeningCamera};
 use evfocus_core::controller::{Action, DeviceFailure};
 use evfocus_hal::{Camera, Clock, DeviceError, DeviceErrorKind, Lens};
 use evfocus_lens::{Firmata, Grbl, Indi, LabJack, MoonLite, Optotune, Port};
+use evfocus_record::{RecordError, ReplayCamera};
 
 use crate::config::{CameraConfig, Config, LensBackend, LensDriver, LensPlace};
 
@@ -36,8 +37,11 @@ impl Devices {
     /// [`OpenError`] with what helps.
     pub fn open(config: &Config, clock: &Arc<dyn Clock>) -> Result<Self, OpenError> {
         let rig = hil_sim::Rig::new(config.rig.clone(), Arc::clone(clock))?;
-        let camera = match config.camera.clone() {
+        let camera: Box<dyn Camera> = match config.camera.clone() {
             CameraConfig::Simulated => Box::new(rig.devices().0),
+            CameraConfig::Replay { file, pace, end } => {
+                Box::new(ReplayCamera::open(file, pace, end, Arc::clone(clock))?)
+            }
             CameraConfig::Davis346 { serial, settings } => {
                 open_usb(Driver::Davis346, serial, clock, move |transport, clock| {
                     Ok(Box::new(Davis346::open(transport, &settings, clock)?))
@@ -62,6 +66,9 @@ pub enum OpenError {
     /// A device cannot be opened.
     #[error(transparent)]
     Device(#[from] DeviceError),
+    /// The recording to be replayed cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordError),
 }
 
 /// Opens the lens that `backend` names: that of `rig`, the rig's behind an emulated controller, or a real one.

@@ -16,6 +16,7 @@ mod metrics;
 pub mod parts_report;
 mod publisher;
 mod real_time;
+pub mod recorder;
 pub mod reload;
 mod reports;
 mod rig_delay;

@@ -88,15 +88,23 @@ impl Aedat4Writer {
         Ok(())
     }
 
+    /// Hands what was written to the system, so that it outlives this program; a packet that is not full is ended.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if it refuses.
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        if !self.pending.is_empty() {
+            self.put_packet()?;
+        }
+        self.file.flush().map_err(|source| RecordError::Write { path: self.path.clone(), source })
+    }
+
     /// Writes what is still held back and closes the file. Without this call the end of the recording is missing.
     ///
     /// # Errors
     /// [`RecordError::Write`] if the system refuses.
     pub fn finish(mut self) -> Result<(), RecordError> {
-        if !self.pending.is_empty() {
-            self.put_packet()?;
-        }
-        self.file.flush().map_err(|source| RecordError::Write { path: self.path, source })
+        self.flush()
     }
 
     fn put_packet(&mut self) -> Result<(), RecordError> {

@@ -17,4 +17,6 @@ mod positions;
 #[cfg(test)]
 mod recordings;
 #[cfg(test)]
+mod replay;
+#[cfg(test)]
 mod summary;

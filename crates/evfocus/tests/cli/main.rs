@@ -13,3 +13,5 @@ mod daemon;
 mod demo;
 mod eval;
 mod program;
+#[cfg(test)]
+mod record;

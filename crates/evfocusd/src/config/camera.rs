@@ -1,12 +1,14 @@
 //! `[camera]`: which camera, and how it is set up.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use evfocus_camera::davis346::{self, CoarseFine, PixelFilterAxes, TriggerInput};
 use evfocus_camera::evk4::{self, RowOrder};
 use evfocus_camera::{Driver, SettingsError};
 use evfocus_core::{Geometry, Window};
+use evfocus_record::{ReplayEnd, ReplayPace};
 use serde::Deserialize;
 
 use super::BadValue;
@@ -15,8 +17,14 @@ use super::BadValue;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSection {
-    /// `simulated`, `davis346` or `evk4`.
+    /// `simulated`, `davis346`, `evk4` or `replay`.
     pub backend: String,
+    /// The recording that is replayed.
+    pub file: Option<PathBuf>,
+    /// How fast: `real-time` or `fastest`.
+    pub replay_pace: Option<String>,
+    /// What comes after its end: `repeat` or `disconnect`.
+    pub replay_end: Option<String>,
     /// Serial number of the camera that is meant; needed where several are attached.
     pub serial: Option<String>,
     /// Changed biases by name: `[coarse, fine]` of a DAVIS346, the offset to the factory's value of an EVK4.
@@ -55,6 +63,9 @@ impl Default for CameraSection {
     fn default() -> Self {
         Self {
             backend: "simulated".to_owned(),
+            file: None,
+            replay_pace: None,
+            replay_end: None,
             serial: None,
             biases: BTreeMap::new(),
             roi: None,
@@ -89,24 +100,44 @@ pub enum CameraConfig {
         /// How it is set up.
         settings: evk4::Settings,
     },
+    /// A recording.
+    Replay {
+        /// The file.
+        file: PathBuf,
+        /// How fast.
+        pace: ReplayPace,
+        /// What comes after its end.
+        end: ReplayEnd,
+    },
 }
 
 impl CameraConfig {
     /// The USB driver; `None` if there is none.
     pub fn driver(&self) -> Option<Driver> {
         match self {
-            Self::Simulated => None,
+            Self::Simulated | Self::Replay { .. } => None,
             Self::Davis346 { .. } => Some(Driver::Davis346),
             Self::Evk4 { .. } => Some(Driver::Evk4),
         }
     }
 
-    /// The sensor's size; `simulated` is that of the simulated one.
-    pub(crate) fn geometry(&self, simulated: Geometry) -> Geometry {
+    /// The sensor's size, as far as it is known without opening the camera; `simulated` is that of the simulated one.
+    pub(crate) fn geometry(&self, simulated: Geometry) -> Option<Geometry> {
         match self {
-            Self::Simulated => simulated,
-            Self::Davis346 { .. } => davis346::GEOMETRY,
-            Self::Evk4 { .. } => evk4::GEOMETRY,
+            Self::Simulated => Some(simulated),
+            Self::Davis346 { .. } => Some(davis346::GEOMETRY),
+            Self::Evk4 { .. } => Some(evk4::GEOMETRY),
+            Self::Replay { .. } => None,
+        }
+    }
+
+    /// As the configuration names it.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Simulated => "simulated".to_owned(),
+            Self::Replay { .. } => "replay".to_owned(),
+            Self::Davis346 { .. } => Driver::Davis346.to_string(),
+            Self::Evk4 { .. } => Driver::Evk4.to_string(),
         }
     }
 }
@@ -153,20 +184,24 @@ impl CameraSection {
         let serial = self.serial.clone();
         match self.backend.as_str() {
             "simulated" => {
-                let written = self.only_of(&["davis346", "evk4"]).chain(self.of_both());
+                let written = self.only_of(&["davis346", "evk4", "replay"]).chain(self.of_both());
                 self.refuse(written)?;
                 Ok(CameraConfig::Simulated)
             }
+            "replay" => {
+                self.refuse(self.only_of(&["davis346", "evk4"]).chain(self.of_both()))?;
+                self.replay()
+            }
             "davis346" => {
-                self.refuse(self.only_of(&["evk4"]))?;
+                self.refuse(self.only_of(&["evk4", "replay"]))?;
                 Ok(CameraConfig::Davis346 { serial, settings: self.davis346()? })
             }
             "evk4" => {
-                self.refuse(self.only_of(&["davis346"]))?;
+                self.refuse(self.only_of(&["davis346", "replay"]))?;
                 Ok(CameraConfig::Evk4 { serial, settings: self.evk4()? })
             }
             other => {
-                let remedy = "it must be \"simulated\", \"davis346\" or \"evk4\"";
+                let remedy = "it must be \"simulated\", \"davis346\", \"evk4\" or \"replay\"";
                 Err(BadValue::new("camera.backend", other, remedy))
             }
         }
@@ -184,9 +219,15 @@ impl CameraSection {
             ("row_order", self.row_order.is_some()),
             ("rate_limit_events_per_s", self.rate_limit_events_per_s.is_some()),
         ];
+        let replay = [
+            ("file", self.file.is_some()),
+            ("replay_pace", self.replay_pace.is_some()),
+            ("replay_end", self.replay_end.is_some()),
+        ];
         let davis346 = davis346.into_iter().filter(move |_| backends.contains(&"davis346"));
         let evk4 = evk4.into_iter().filter(move |_| backends.contains(&"evk4"));
-        davis346.chain(evk4).filter_map(|(key, is_written)| is_written.then_some(key))
+        let replay = replay.into_iter().filter(move |_| backends.contains(&"replay"));
+        davis346.chain(evk4).chain(replay).filter_map(|(key, is_written)| is_written.then_some(key))
     }
 
     /// Keys that are written and that both USB cameras have.
@@ -206,6 +247,17 @@ impl CameraSection {
             let remedy = format!("the camera \"{}\" has no such setting; take it out", self.backend);
             Err(BadValue::new(format!("camera.{key}"), "given", remedy))
         })
+    }
+
+    fn replay(&self) -> Result<CameraConfig, BadValue> {
+        let file = self.file.clone().filter(|file| !file.as_os_str().is_empty()).ok_or_else(|| {
+            BadValue::new("camera.file", "not given", "name the recording that is to be replayed")
+        })?;
+        let paces = [("real-time", ReplayPace::RealTime), ("fastest", ReplayPace::AsFastAsPossible)];
+        let ends = [("repeat", ReplayEnd::Repeat), ("disconnect", ReplayEnd::Disconnect)];
+        let pace = choice("camera.replay_pace", self.replay_pace.as_ref(), &paces)?;
+        let end = choice("camera.replay_end", self.replay_end.as_ref(), &ends)?;
+        Ok(CameraConfig::Replay { file, pace, end })
     }
 
     fn davis346(&self) -> Result<davis346::Settings, BadValue> {
