@@ -9,6 +9,8 @@ pub mod davis;
 mod evt2;
 pub mod evt3;
 mod framing;
+mod runs;
+mod vectorized;
 
 pub use davis::{DavisWordCounter, DavisWordDecoder};
 pub use evt2::Evt2Decoder;

@@ -10,6 +10,8 @@ use alloc::vec::Vec;
 
 use super::TimeRule;
 use super::framing::Framing;
+use super::runs::kept_while;
+use super::vectorized::{TakeWords, take_words};
 use crate::damage::Damage;
 use crate::event::{Event, EventBatch, Geometry, Polarity};
 use crate::units::CameraMicros;
@@ -114,7 +116,7 @@ impl DavisWordDecoder {
     pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         let state = &mut self.state;
         let dropped = state.damage.events_before_address + state.damage.outside_sensor;
-        self.framing.feed_slices(bytes, |words| state.words(words, &mut batch.events));
+        self.framing.feed_slices(bytes, |words| take_words(state, words, &mut batch.events));
         batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
         batch.reached = state.time.now().map(CameraMicros).or(batch.reached);
     }
@@ -142,22 +144,22 @@ impl Default for DavisWordDecoder {
     }
 }
 
-impl State {
-    fn words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
+impl TakeWords<Vec<Event>> for State {
+    #[inline(always)]
+    fn take_words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
         while let Some((&first, rest)) = words.split_first() {
-            let word = Word::of(u16::from_le_bytes(first));
-            if !matches!(word, Word::Column(..)) {
-                self.word(word);
+            if is_column(first) {
+                words = self.columns(words, events);
+            } else {
+                self.word(Word::of(u16::from_le_bytes(first)));
                 words = rest;
-                continue;
             }
-            // Events come in runs of one row and time, which are written without looking again.
-            let (columns, rest) = words.split_at(words.iter().take_while(|word| is_column(**word)).count());
-            self.columns(columns, events);
-            words = rest;
         }
     }
+}
 
+impl State {
+    #[inline(always)]
     fn word(&mut self, word: Word) {
         match word {
             Word::Time(low) => self.time.low(low),
@@ -183,29 +185,39 @@ impl State {
         self.column = if exists { Column::At(row) } else { Column::OutsideSensor };
     }
 
-    /// Words of which each is an event of the same time and row.
-    fn columns(&mut self, words: &[[u8; 2]], events: &mut Vec<Event>) {
-        let all = words.len() as u64;
-        let (t, x) = match (self.time.now(), self.column) {
-            (Some(t), Column::At(x)) => (CameraMicros(t), x),
-            (None, _) => return self.damage.events_before_time += all,
-            (Some(_), Column::None) => return self.damage.events_before_address += all,
-            (Some(_), Column::OutsideSensor) => return self.damage.outside_sensor += all,
+    /// Events, which come in runs of one time and row; returns the words after them.
+    #[inline(always)]
+    fn columns<'words>(&mut self, words: &'words [[u8; 2]], events: &mut Vec<Event>) -> &'words [[u8; 2]] {
+        let (Some(t), Column::At(x)) = (self.time.now(), self.column) else {
+            let run = words.iter().take_while(|bytes| is_column(**bytes)).count();
+            self.drop(run as u64);
+            return words.get(run..).unwrap_or_default();
         };
-        let row = |bytes: &[u8; 2]| u16::from_le_bytes(*bytes) & DATA_MASK;
-        let event = |bytes: &[u8; 2]| Event {
-            t,
+        let event = move |word: u16| Event {
+            t: CameraMicros(t),
             x,
-            y: row(bytes),
-            polarity: Polarity::from_on(u16::from_le_bytes(*bytes) & POLARITY_BIT != 0),
+            y: word & DATA_MASK,
+            polarity: Polarity::from_on(word & POLARITY_BIT != 0),
         };
-        let exists = |bytes: &&[u8; 2]| row(bytes) < DavisWordDecoder::GEOMETRY.height;
-        if words.iter().all(|bytes| exists(&bytes)) {
-            events.extend(words.iter().map(event));
-        } else {
-            let before = events.len();
-            events.extend(words.iter().filter(exists).map(event));
-            self.damage.outside_sensor += all - (events.len() - before) as u64;
+        let height = DavisWordDecoder::GEOMETRY.height;
+        let kept = move |word: u16| (word >> 13 == COLUMN_KIND) & (word & DATA_MASK < height);
+        let rest = kept_while(words, kept, event, events);
+        // What ended the run may be an event in a row of the picture that does not exist.
+        match rest.split_first() {
+            Some((&next, after)) if is_column(next) => {
+                self.damage.outside_sensor += 1;
+                after
+            }
+            _ => rest,
+        }
+    }
+
+    /// Events that cannot be placed.
+    fn drop(&mut self, events: u64) {
+        match (self.time.now(), self.column) {
+            (None, _) => self.damage.events_before_time += events,
+            (Some(_), Column::None | Column::At(_)) => self.damage.events_before_address += events,
+            (Some(_), Column::OutsideSensor) => self.damage.outside_sensor += events,
         }
     }
 }

@@ -2,6 +2,7 @@
 //! damaged streams as in OpenEB's decoder, `hal/cpp/include/metavision/hal/decoders/evt3`).
 
 mod counter;
+mod rate_control;
 mod time;
 
 pub use counter::Evt3Counter;
@@ -10,9 +11,12 @@ use alloc::vec::Vec;
 
 use super::TimeRule;
 use super::framing::Framing;
+use super::runs::kept_while;
+use super::vectorized::{TakeWords, take_words};
 use crate::damage::Damage;
 use crate::event::{Event, EventBatch, Geometry, Polarity};
 use crate::units::CameraMicros;
+use rate_control::RateControl;
 use time::Evt3Time;
 
 /// The type of a word, bits 15 to 12.
@@ -50,6 +54,33 @@ const PAYLOAD_MASK: u16 = 0xFFF;
 /// Microseconds until the 24 bits of time wrap.
 pub const TIME_PERIOD_US: i64 = 1 << 24;
 
+/// Where the bits of the lowest twelve are that are set: four bits for each, the lowest first.
+#[inline]
+fn packed_offsets(valid: u16) -> u64 {
+    let (low, high) = (usize::from(valid & 0xFF), usize::from(valid >> 8 & 0xF));
+    // The places of bits 8 to 11 lie eight higher.
+    let high_offsets = u64::from(OFFSETS[high]) + 0x8888;
+    u64::from(OFFSETS[low]) | high_offsets << (4 * low.count_ones())
+}
+
+/// [`packed_offsets`] of each byte.
+const OFFSETS: [u32; 256] = {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut bit, mut shift) = (0, 0);
+        while bit < 8 {
+            if byte >> bit & 1 == 1 {
+                table[byte] |= bit << shift;
+                shift += 4;
+            }
+            bit += 1;
+        }
+        byte += 1;
+    }
+    table
+};
+
 /// Decodes EVT 3.0 words into events.
 ///
 /// Decoding starts at the first TIME_HIGH. Events before a row or a vector base are dropped; so are events in rows or
@@ -68,8 +99,11 @@ struct State {
     row: Row,
     /// Column of the next vector's first pixel.
     base: Option<u16>,
-    polarity: Polarity,
+    /// An event of the next vector, complete but for its column. Copies of it take two stores each, of the event and of the column; put
+    /// together in its place each would take four, and stores are what bounds decoding.
+    of_vector: Event,
     triggers: u64,
+    rate_control: RateControl,
     damage: Damage,
 }
 
@@ -107,8 +141,9 @@ impl Evt3Decoder {
             time,
             row: Row::None,
             base: None,
-            polarity: Polarity::Off,
+            of_vector: Event { t: CameraMicros(0), x: 0, y: 0, polarity: Polarity::Off },
             triggers: 0,
+            rate_control: RateControl::default(),
             damage: Damage::default(),
         };
         Self { framing: Framing::new(), state }
@@ -119,9 +154,9 @@ impl Evt3Decoder {
     /// events per byte are appended.
     pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         let state = &mut self.state;
-        let dropped = state.damage.events_before_address + state.damage.outside_sensor;
-        self.framing.feed_slices(bytes, |words| state.words(words, &mut batch.events));
-        batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
+        let lost = state.lost();
+        self.framing.feed_slices(bytes, |words| take_words(state, words, &mut batch.events));
+        batch.lost += state.lost() - lost;
         batch.reached = state.time.now().map(CameraMicros).or(batch.reached);
     }
 
@@ -142,92 +177,118 @@ impl Evt3Decoder {
     }
 }
 
-impl State {
-    fn words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
+impl TakeWords<Vec<Event>> for State {
+    #[inline(always)]
+    fn take_words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
         while let Some((&first, rest)) = words.split_first() {
             let word = u16::from_le_bytes(first);
-            if word >> 12 != word_type::ADDR_X {
+            if word >> 12 == word_type::ADDR_X {
+                words = self.singles(words, events);
+            } else {
                 self.word(word, events);
                 words = rest;
-                continue;
             }
-            // Single events come in runs of one row and time, which are written without looking again.
-            let is_single = |bytes: &&[u8; 2]| u16::from_le_bytes(**bytes) >> 12 == word_type::ADDR_X;
-            let (singles, rest) = words.split_at(words.iter().take_while(is_single).count());
-            self.singles(singles, events);
-            words = rest;
         }
     }
+}
 
+impl State {
     /// Any word but ADDR_X.
+    #[inline(always)]
     fn word(&mut self, word: u16, events: &mut Vec<Event>) {
         match word >> 12 {
-            word_type::TIME_LOW => self.time.low(word & PAYLOAD_MASK),
+            word_type::TIME_LOW => {
+                self.time.low(word & PAYLOAD_MASK);
+                self.of_vector.t = CameraMicros(self.time.now().unwrap_or_default());
+            }
             word_type::ADDR_Y => self.row(word & ADDRESS_MASK),
-            word_type::TIME_HIGH => self.time.high(word & PAYLOAD_MASK),
+            word_type::TIME_HIGH => {
+                self.time.high(word & PAYLOAD_MASK);
+                self.of_vector.t = CameraMicros(self.time.now().unwrap_or_default());
+            }
             word_type::VECT_BASE_X => {
                 self.base = Some(word & ADDRESS_MASK);
-                self.polarity = Polarity::from_on(word & POLARITY_BIT != 0);
+                self.of_vector.polarity = Polarity::from_on(word & POLARITY_BIT != 0);
             }
             word_type::VECT_12 => self.vector(word & PAYLOAD_MASK, 12, events),
             word_type::VECT_8 => self.vector(word & 0xFF, 8, events),
             word_type::EXT_TRIGGER => self.triggers += u64::from(self.time.now().is_some()),
-            word_type::CONTINUED_4 | word_type::OTHERS | word_type::CONTINUED_12 => {}
+            word_type::OTHERS => self.rate_control.announce(word & PAYLOAD_MASK),
+            word_type::CONTINUED_4 => self.continued(word & 0xF, 4),
+            word_type::CONTINUED_12 => self.continued(word & PAYLOAD_MASK, 12),
             _ => self.damage.unknown_words += 1,
         }
     }
 
-    fn row(&mut self, y: u16) {
-        self.row = if y < self.geometry.height { Row::At(y) } else { Row::OutsideSensor };
+    fn continued(&mut self, payload: u16, bits: u32) {
+        self.damage.dropped_by_camera += self.rate_control.go_on(payload, bits);
     }
 
-    fn singles(&mut self, words: &[[u8; 2]], events: &mut Vec<Event>) {
+    /// Events that a batch must tell of: those before the first time are not missed by anybody.
+    fn lost(&self) -> u64 {
+        self.damage.events_before_address + self.damage.outside_sensor + self.damage.dropped_by_camera
+    }
+
+    fn row(&mut self, y: u16) {
+        self.row = if y < self.geometry.height { Row::At(y) } else { Row::OutsideSensor };
+        self.of_vector.y = y;
+    }
+
+    /// Single events, which come in runs of one row and time; returns the words after them.
+    #[inline(always)]
+    fn singles<'words>(&mut self, words: &'words [[u8; 2]], events: &mut Vec<Event>) -> &'words [[u8; 2]] {
         let (Some(t), Row::At(y)) = (self.time.now(), self.row) else {
-            self.drop(words.len());
-            return;
+            let is_single = |bytes: &&[u8; 2]| u16::from_le_bytes(**bytes) >> 12 == word_type::ADDR_X;
+            let run = words.iter().take_while(is_single).count();
+            self.drop(run);
+            return words.get(run..).unwrap_or_default();
         };
         let width = self.geometry.width;
-        let column = |bytes: &[u8; 2]| u16::from_le_bytes(*bytes) & ADDRESS_MASK;
-        let event = |bytes: &[u8; 2]| Event {
+        let event = move |word: u16| Event {
             t: CameraMicros(t),
-            x: column(bytes),
+            x: word & ADDRESS_MASK,
             y,
-            polarity: Polarity::from_on(u16::from_le_bytes(*bytes) & POLARITY_BIT != 0),
+            polarity: Polarity::from_on(word & POLARITY_BIT != 0),
         };
-        let outside = words.iter().filter(|bytes| column(bytes) >= width).count();
-        if outside == 0 {
-            events.extend(words.iter().map(event));
-        } else {
-            events.extend(words.iter().filter(|bytes| column(bytes) < width).map(event));
-            self.damage.outside_sensor += outside as u64;
+        let rest = kept_while(
+            words,
+            move |word| (word >> 12 == word_type::ADDR_X) & (word & ADDRESS_MASK < width),
+            event,
+            events,
+        );
+        // What ended the run may be a single event in a column that does not exist.
+        match rest.split_first() {
+            Some((&next, after)) if u16::from_le_bytes(next) >> 12 == word_type::ADDR_X => {
+                self.damage.outside_sensor += 1;
+                after
+            }
+            _ => rest,
         }
     }
 
+    #[inline(always)]
     fn vector(&mut self, valid: u16, pixels: u16, events: &mut Vec<Event>) {
         // Saturates on streams that are not a camera's: columns that far out are dropped anyhow.
         let next = self.base.map(|base| base.saturating_add(pixels));
         let base = core::mem::replace(&mut self.base, next);
-        let (Some(base), Some(t), Row::At(y)) = (base, self.time.now(), self.row) else {
+        let (Some(base), Some(_), Row::At(_)) = (base, self.time.now(), self.row) else {
             self.drop(valid.count_ones() as usize);
             return;
         };
         let on_sensor = (1 << self.geometry.width.saturating_sub(base).min(pixels)) - 1;
         let inside = valid & on_sensor;
         self.damage.outside_sensor += u64::from((valid ^ inside).count_ones());
-        // Each offset is written, and kept if its bit is set: a branch for each bit would be guessed wrong half of the time.
-        let (mut offsets, mut count) = ([0_u8; 16], 0);
-        for offset in 0..12_u8 {
-            offsets[count & 0xF] = offset;
-            count += usize::from(inside >> offset & 1);
+        // Twelve events are written, and as many kept as there are bits: a branch for each bit would be guessed wrong half of the time.
+        let mut offsets = packed_offsets(inside);
+        let length = events.len();
+        events.resize(length + 12, self.of_vector);
+        if let Some(slots) = events.get_mut(length..).and_then(<[Event]>::first_chunk_mut::<12>) {
+            for slot in slots {
+                slot.x = base.wrapping_add((offsets & 0xF) as u16);
+                offsets >>= 4;
+            }
         }
-        let (t, polarity) = (CameraMicros(t), self.polarity);
-        let valid_offsets = offsets.get(..count).unwrap_or_default();
-        events.extend(valid_offsets.iter().map(|&offset| Event {
-            t,
-            x: base + u16::from(offset),
-            y,
-            polarity,
-        }));
+        events.truncate(length + inside.count_ones() as usize);
     }
 
     /// Events that cannot be placed.

@@ -85,6 +85,18 @@ fn evt3_counts_triggers_unknown_words_and_a_half_word() {
 }
 
 #[test]
+fn evt3_tells_what_the_rate_controller_dropped() {
+    // 0x1234567 events in, 0x1234500 out; then counts without the other one, and one cut short by another word.
+    let (batch, decoder) = evt3(&[0x8000, 0xE014, 0xF567, 0xF234, 0x7001, 0xE016, 0xF500, 0xF234, 0x7001]);
+    assert_eq!((batch.lost, decoder.damage().dropped_by_camera), (0x67, 0x67));
+    let (batch, _) = evt3(&[0x8000, 0xE016, 0xF000, 0xF000, 0x7000, 0xE014, 0xF001, 0xE019, 0xF002, 0x7000]);
+    assert_eq!(batch.lost, 0);
+    // Another pair: as many out as in.
+    let (batch, _) = evt3(&[0x8000, 0xE014, 0xF007, 0xF000, 0x7000, 0xE016, 0xF007, 0xF000, 0x7000]);
+    assert_eq!(batch.lost, 0);
+}
+
+#[test]
 fn evt2_events_and_wrap() {
     let high = |micros: u64| 0x8000_0000 | (micros >> 6) as u32;
     let on = |fine: u32, x: u32, y: u32| 0x1000_0000 | fine << 22 | x << 11 | y;
@@ -154,4 +166,17 @@ fn four_thousand_wraps_in_a_row_are_that_much_time() {
     assert_eq!(batch.reached, Some(CameraMicros(4096 << 15)));
     let (batch, decoder) = davis(&[0x7FFF, 0x8001]);
     assert_eq!((batch.reached, decoder.damage().time_jumps), (Some(CameraMicros((4095 << 15) + 1)), 1));
+}
+
+#[test]
+fn a_stream_of_zeros_is_no_events_and_no_time() {
+    let zeros = vec![0; 1 << 20];
+    let (mut batch, mut evt3, mut davis) =
+        (EventBatch::default(), Evt3Decoder::live(SENSOR), DavisWordDecoder::live());
+    evt3.decode(&zeros, &mut batch);
+    davis.decode(&zeros, &mut batch);
+    assert_eq!((batch.events.len(), batch.reached, batch.lost), (0, None, 0));
+    // To EVT3 a zero is the first row; a DAVIS346 never sends one.
+    assert!(evt3.damage().is_none());
+    assert_eq!(davis.damage(), Damage { unknown_words: 1 << 19, ..Damage::default() });
 }

@@ -1,10 +1,11 @@
 //! Counting the events of a DAVIS346's words without their coordinates.
 
 use super::time::DavisTime;
-use super::{Word, special};
+use super::{COLUMN_KIND, Word, special};
 use crate::decode::TimeRule;
 use crate::decode::bins::OpenBin;
 use crate::decode::framing::Framing;
+use crate::decode::vectorized::{TakeWords, take_words};
 use crate::units::CameraMicros;
 
 /// Counts events into time bins straight from the words.
@@ -14,6 +15,11 @@ use crate::units::CameraMicros;
 #[derive(Debug, Clone)]
 pub struct DavisWordCounter {
     framing: Framing<2>,
+    state: State,
+}
+
+#[derive(Debug, Clone)]
+struct State {
     time: DavisTime,
     bin: OpenBin,
 }
@@ -21,33 +27,111 @@ pub struct DavisWordCounter {
 impl DavisWordCounter {
     /// A counter into bins of `bin_us` microseconds (at least 1), which begin at multiples of that.
     pub fn new(bin_us: u32) -> Self {
-        Self { framing: Framing::new(), time: DavisTime::new(TimeRule::Ascending), bin: OpenBin::new(bin_us) }
+        let state = State { time: DavisTime::new(TimeRule::Ascending), bin: OpenBin::new(bin_us) };
+        Self { framing: Framing::new(), state }
     }
 
     /// Counts the events in `bytes`; `out` gets the start of each bin that has events, and how many. A bin that is still open
     /// at the end of `bytes` is handed out as far as it is known, and the rest of it in the next call.
     pub fn count(&mut self, bytes: &[u8], mut out: impl FnMut(CameraMicros, u64)) {
-        let Self { framing, time, bin } = self;
-        framing.feed(bytes, |word| {
-            match Word::of(u16::from_le_bytes(word)) {
-                Word::Column(..) => {
-                    bin.add(u64::from(time.now().is_some()));
-                    return;
-                }
-                Word::Time(low) => time.low(low),
-                Word::Wrap(times) => time.wrap(times),
-                Word::Special(special::TIMESTAMP_RESET) => time.reset(),
-                Word::Special(_) | Word::Row(_) | Word::NoEvents => return,
-            }
-            if let Some(now) = time.now() {
-                bin.move_to(now, &mut out);
-            }
-        });
-        bin.flush(&mut out);
+        let state = &mut self.state;
+        self.framing.feed_slices(bytes, |words| take_words(state, words, &mut out));
+        state.bin.flush(&mut out);
     }
 
     /// The newest time; `None` before the first.
     pub fn reached(&self) -> Option<CameraMicros> {
-        self.time.now().map(CameraMicros)
+        self.state.time.now().map(CameraMicros)
     }
+}
+
+/// Words that are looked at together: as many as a number has bits.
+const BLOCK: usize = 64;
+/// A word without events and without time.
+const FILLER: [u8; 2] = 0x6000_u16.to_le_bytes();
+
+impl<Out: FnMut(CameraMicros, u64)> TakeWords<Out> for State {
+    #[inline(always)]
+    fn take_words(&mut self, words: &[[u8; 2]], out: &mut Out) {
+        let (blocks, rest) = words.as_chunks();
+        for block in blocks {
+            self.block(block, out);
+        }
+        if !rest.is_empty() {
+            let mut block = [FILLER; BLOCK];
+            for (slot, &word) in block.iter_mut().zip(rest) {
+                *slot = word;
+            }
+            self.block(&block, out);
+        }
+    }
+}
+
+impl State {
+    /// Goes from one word of time to the next; the events between them are a number of bits.
+    #[inline(always)]
+    fn block(&mut self, block: &[[u8; 2]; BLOCK], out: &mut impl FnMut(CameraMicros, u64)) {
+        let mut events = bits(block, |word| word >> 13 == COLUMN_KIND);
+        let mut times = bits(block, tells_time);
+        let (mut wraps_us, mut newest_us, mut end_us) = self.within_bin();
+        while times != 0 {
+            let index = times.trailing_zeros();
+            times &= times - 1;
+            let word = block.get(index as usize).map_or(0, |&bytes| u16::from_le_bytes(bytes));
+            let time_us = wraps_us.saturating_add(i64::from(word & 0x7FFF));
+            if (word & 0x8000 != 0) & (time_us >= newest_us) & (time_us < end_us) {
+                newest_us = time_us;
+                continue;
+            }
+            self.reach(newest_us);
+            let before = !(u64::MAX << index);
+            if self.time.now().is_some() {
+                self.bin.add(u64::from((events & before).count_ones()));
+            }
+            events &= !before;
+            match Word::of(word) {
+                Word::Time(low) => self.time.low(low),
+                Word::Wrap(times) => self.time.wrap(times),
+                Word::Special(_) => self.time.reset(),
+                Word::Row(_) | Word::Column(..) | Word::NoEvents => {}
+            }
+            if let Some(now) = self.time.now() {
+                self.bin.move_to(now, out);
+            }
+            (wraps_us, newest_us, end_us) = self.within_bin();
+        }
+        self.reach(newest_us);
+        if self.time.now().is_some() {
+            self.bin.add(u64::from(events.count_ones()));
+        }
+    }
+
+    /// What a time word is added to, and from when until when that stays in the open bin and does not fall.
+    fn within_bin(&self) -> (i64, i64, i64) {
+        let newest_us = self.time.now().unwrap_or(i64::MAX);
+        (self.time.wraps_us(), newest_us, self.bin.range().1)
+    }
+
+    /// Takes note of a time that followed the newest one.
+    fn reach(&mut self, newest_us: i64) {
+        if self.time.now().is_some() {
+            self.time.advance_to(newest_us);
+        }
+    }
+}
+
+/// Whether a word is a time, a wrap or a reset.
+#[inline(always)]
+fn tells_time(word: u16) -> bool {
+    (word & 0x8000 != 0) | (word >> 12 == 7) | (word == special::TIMESTAMP_RESET)
+}
+
+/// Bit i is what `test` says of word i.
+#[inline(always)]
+fn bits(block: &[[u8; 2]; BLOCK], test: impl Fn(u16) -> bool) -> u64 {
+    let flags = block.map(|bytes| u8::from(test(u16::from_le_bytes(bytes))));
+    let eights = flags.as_chunks::<8>().0.iter().enumerate();
+    // The factor moves the lowest bit of byte i to bit i of the highest byte.
+    let byte = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+    eights.fold(0, |bits, (index, eight)| bits | byte(eight) << (8 * index))
 }

@@ -24,10 +24,22 @@ impl DavisTime {
     }
 
     /// Microseconds; `None` until a word has told the time.
+    #[inline]
     pub(super) fn now(&self) -> Option<i64> {
         self.now
     }
 
+    /// What a time word is added to.
+    pub(super) fn wraps_us(&self) -> i64 {
+        self.wraps_us
+    }
+
+    /// As [`low`](Self::low), for a time that is known not to fall.
+    pub(super) fn advance_to(&mut self, now: i64) {
+        self.now = Some(now);
+    }
+
+    #[inline]
     pub(super) fn low(&mut self, low: u16) {
         let falls = self.now.is_some_and(|now| self.wraps_us.saturating_add(i64::from(low)) < now);
         if falls && self.rule == TimeRule::Ascending {

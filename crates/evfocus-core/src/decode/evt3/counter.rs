@@ -5,11 +5,14 @@ use super::{PAYLOAD_MASK, word_type};
 use crate::decode::TimeRule;
 use crate::decode::bins::OpenBin;
 use crate::decode::framing::Framing;
+use crate::decode::vectorized::{TakeWords, take_words};
 use crate::units::CameraMicros;
 
-/// Words that are looked at together: enough for the compiler to use vector instructions, few enough to lie within one bin of
-/// a fast stream.
-const BLOCK: usize = 64;
+/// Words that are looked at together: many enough that what they share costs little, few enough that most blocks of a fast stream
+/// lie within one bin.
+const BLOCK: usize = 128;
+/// Words that are looked at one by one where a block leaves the bin. A bound on what a stream can cost in which every word does.
+const STEP: usize = 8;
 
 /// Counts events into time bins straight from the words.
 ///
@@ -38,7 +41,7 @@ impl Evt3Counter {
     /// at the end of `bytes` is handed out as far as it is known, and the rest of it in the next call.
     pub fn count(&mut self, bytes: &[u8], mut out: impl FnMut(CameraMicros, u64)) {
         let state = &mut self.state;
-        self.framing.feed_slices(bytes, |words| state.words(words, &mut out));
+        self.framing.feed_slices(bytes, |words| take_words(state, words, &mut out));
         state.bin.flush(&mut out);
     }
 
@@ -48,44 +51,54 @@ impl Evt3Counter {
     }
 }
 
-impl State {
-    fn words(&mut self, words: &[[u8; 2]], out: &mut impl FnMut(CameraMicros, u64)) {
-        let (blocks, rest) = words.as_chunks::<BLOCK>();
-        for block in blocks {
-            match self.block(block) {
-                Some((events, newest)) => {
-                    self.bin.add(events);
-                    self.time.low(newest);
-                }
-                None => self.one_by_one(block, out),
-            }
+impl<Out: FnMut(CameraMicros, u64)> TakeWords<Out> for State {
+    #[inline(always)]
+    fn take_words(&mut self, mut words: &[[u8; 2]], out: &mut Out) {
+        while let Some(block) = words.first_chunk() {
+            let taken = self.block(block, out);
+            words = words.get(taken..).unwrap_or_default();
         }
-        self.one_by_one(rest, out);
+        self.one_by_one(words, out);
+    }
+}
+
+impl State {
+    /// Counts the words of `block`, or the first of them, and says how many.
+    #[inline(always)]
+    fn block(&mut self, block: &[[u8; 2]; BLOCK], out: &mut impl FnMut(CameraMicros, u64)) -> usize {
+        if self.time.now().is_none() {
+            self.one_by_one(block, out);
+            return BLOCK;
+        }
+        let bin = self.open_bin();
+        let all = bin.look(block, BLOCK);
+        if all.leaving == BLOCK {
+            self.take(all);
+            return BLOCK;
+        }
+        self.take(bin.look(block, all.leaving));
+        let rest = block.get(all.leaving..).unwrap_or_default();
+        let step = rest.get(..STEP).unwrap_or(rest);
+        self.one_by_one(step, out);
+        all.leaving + step.len()
     }
 
-    /// The number of events in `block` and its newest fine time (0 without one), if all of it belongs to the open bin.
-    fn block(&self, block: &[[u8; 2]; BLOCK]) -> Option<(u64, u16)> {
-        self.time.now()?;
+    #[inline(always)]
+    fn take(&mut self, seen: Seen) {
+        self.bin.add(u64::from(seen.events));
+        self.time.low(seen.newest);
+    }
+
+    #[inline(always)]
+    fn open_bin(&self) -> BinOfWords {
         let (high, coarse_us) = self.time.coarse();
-        // The bin as fine times of the present coarse time: the first one, and how many there are.
         let (start_us, end_us) = self.bin.range();
         let first = start_us.saturating_sub(coarse_us).clamp(0, 4096) as u16;
         let width = (end_us.saturating_sub(coarse_us).clamp(0, 4096) as u16).saturating_sub(first);
-        let (mut events, mut leaves, mut newest) = (0, 0, 0);
-        for &bytes in block {
-            let word = u16::from_le_bytes(bytes);
-            let (kind, payload) = (word >> 12, word & PAYLOAD_MASK);
-            let twelve = u16::from(kind == word_type::VECT_12) * 0xFFF;
-            let eight = u16::from(kind == word_type::VECT_8) * 0xFF;
-            events += (word & (twelve | eight)).count_ones() as u16 + u16::from(kind == word_type::ADDR_X);
-            leaves |= u16::from(kind == word_type::TIME_HIGH) & u16::from(payload != high);
-            let is_low = u16::from(kind == word_type::TIME_LOW);
-            leaves |= is_low & u16::from(payload.wrapping_sub(first) >= width);
-            newest = newest.max(is_low * payload);
-        }
-        (leaves == 0).then_some((u64::from(events), newest))
+        BinOfWords { first, width, high: word_type::TIME_HIGH << 12 | high }
     }
 
+    #[inline(always)]
     fn one_by_one(&mut self, words: &[[u8; 2]], out: &mut impl FnMut(CameraMicros, u64)) {
         for &bytes in words {
             let word = u16::from_le_bytes(bytes);
@@ -111,4 +124,58 @@ impl State {
             }
         }
     }
+}
+
+/// The open bin, as words tell time while the coarse time lasts.
+#[derive(Debug, Clone, Copy)]
+struct BinOfWords {
+    /// Its first fine time, and how many it has.
+    first: u16,
+    width: u16,
+    /// The TIME_HIGH that changes nothing.
+    high: u16,
+}
+
+/// What words hold.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// Events in them.
+    events: u16,
+    /// Their newest fine time; 0 without one.
+    newest: u16,
+    /// The first of them that leaves the bin; their number if none does.
+    leaving: usize,
+}
+
+impl BinOfWords {
+    /// What the first `count` words of `block` hold. Nothing here branches on a word, so that the compiler can look at many at once.
+    #[inline(always)]
+    fn look(self, block: &[[u8; 2]; BLOCK], count: usize) -> Seen {
+        let count = count as u16;
+        let (mut events, mut newest, mut leaving) = (0, 0, count);
+        let mut index = 0_u16;
+        for &bytes in block {
+            let word = u16::from_le_bytes(bytes);
+            let counts = mask(index < count);
+            let (kind, payload) = (word >> 12, word & PAYLOAD_MASK);
+            let twelve = mask(kind == word_type::VECT_12) & PAYLOAD_MASK;
+            let eight = mask(kind == word_type::VECT_8) & 0xFF;
+            let single = mask(kind == word_type::ADDR_X) & 1 << 15;
+            events += ((word & (twelve | eight) | single) & counts).count_ones() as u16;
+            let is_low = mask(kind == word_type::TIME_LOW) & counts;
+            newest = newest.max(payload & is_low);
+            let is_high = mask(kind == word_type::TIME_HIGH) & counts;
+            let leaves = is_low & mask(payload.wrapping_sub(self.first) >= self.width)
+                | is_high & mask(word != self.high);
+            leaving = leaving.min(index | !leaves);
+            index += 1;
+        }
+        Seen { events, newest, leaving: usize::from(leaving) }
+    }
+}
+
+/// All bits if `condition` holds, else none.
+#[inline(always)]
+fn mask(condition: bool) -> u16 {
+    u16::from(condition).wrapping_neg()
 }

@@ -27,15 +27,18 @@ impl Evt3Time {
     }
 
     /// Microseconds; `None` before the first TIME_HIGH.
+    #[inline]
     pub(super) fn now(&self) -> Option<i64> {
         self.now
     }
 
     /// Payload of the newest TIME_HIGH, and the time at which its 4096 us begin.
+    #[inline]
     pub(super) fn coarse(&self) -> (u16, i64) {
         (self.high, self.period_start.saturating_add(i64::from(self.high) << 12))
     }
 
+    #[inline]
     pub(super) fn low(&mut self, low: u16) {
         let Some(now) = self.now else { return };
         let time = self.coarse().1.saturating_add(i64::from(low));
