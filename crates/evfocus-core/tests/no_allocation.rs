@@ -1,68 +1,17 @@
 //! The event path allocates nothing: from the start of the sweep to the result, and in the clock map ever.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test whose own fixture is missing fails")]
 
-use core::cell::Cell;
-use std::alloc::{GlobalAlloc, Layout, System};
-
 use evfocus_core::{CameraMicros, ClockMap, HostMicros, Method, Outcome, Phase};
 
+#[path = "support/allocations.rs"]
+mod allocations;
 #[path = "support/random.rs"]
 mod random;
 #[path = "controller/rig.rs"]
 #[expect(dead_code, reason = "the rig of the controller's tests can do more than is needed here")]
 mod rig;
 
-thread_local! {
-    /// Of this thread only: the test harness allocates in its own.
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-fn count() {
-    // A thread that is ending has no counter any more, and no test either.
-    let _gone = ALLOCATIONS.try_with(|allocations| allocations.set(allocations.get() + 1));
-}
-
-#[expect(
-    unsafe_code,
-    reason = "an allocator is unsafe by its nature; this one passes everything on to the system's"
-)]
-// SAFETY: every call is passed on unchanged to the system's allocator, which keeps the contract.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `alloc_zeroed`.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `realloc`.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `dealloc`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Allocations while `work` is done.
-fn allocations_in(work: impl FnOnce()) -> u64 {
-    let before = ALLOCATIONS.get();
-    work();
-    ALLOCATIONS.get() - before
-}
+use allocations::allocations_in;
 
 #[test]
 fn the_counter_of_allocations_counts() {
