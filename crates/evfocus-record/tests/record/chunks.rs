@@ -1,16 +1,20 @@
-//! The decoders of live cameras give real recordings exactly, however the bytes come; so do the counters.
+//! The decoders of live cameras give real recordings exactly, however the bytes come; so do the counters. `EVFOCUS_RECORDINGS=FOLDER`
+//! does the same with a folder of more.
+
+use std::path::{Path, PathBuf};
 
 use evfocus_core::decode::{DavisWordCounter, DavisWordDecoder, Evt3Counter, Evt3Decoder};
 use evfocus_core::{Event, EventBatch, Geometry};
+use evfocus_record::{Format, Recording};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
 use crate::common::{data, read_file};
 
 /// The words of a file, without its header.
-fn words(name: &str) -> Vec<u8> {
+fn words(path: &Path) -> Vec<u8> {
     const HEADER_END: &[u8] = b"% end\n";
-    let bytes = std::fs::read(data(name)).unwrap();
+    let bytes = std::fs::read(path).unwrap();
     let start = bytes.windows(HEADER_END.len()).position(|window| window == HEADER_END);
     bytes[start.map_or(0, |start| start + HEADER_END.len())..].to_vec()
 }
@@ -30,49 +34,70 @@ fn in_chunks(bytes: &[u8], sizes: &[usize], mut feed: impl FnMut(&[u8])) {
     }
 }
 
-fn evt3_is_exact(name: &str, geometry: Geometry, sizes: &[usize]) {
-    let bytes = words(name);
-    let expected = read_file(&data(name), None);
+fn evt3_is_exact(path: &Path, geometry: Geometry, sizes: &[usize]) {
+    let bytes = words(path);
+    let expected = expected(path);
     let (mut batch, mut decoder) = (EventBatch::default(), Evt3Decoder::live(geometry));
     let (mut counted, mut counter) = (0, Evt3Counter::new(20));
     in_chunks(&bytes, sizes, |chunk| {
         decoder.decode(chunk, &mut batch);
         counter.count(chunk, |_, events| counted += events);
     });
-    exact(name, &batch.events, &expected, counted);
-    assert!(decoder.damage().is_none(), "{name}: {:?}", decoder.damage());
+    exact(path, &batch.events, &expected, counted);
+    assert!(decoder.damage().is_none(), "{}: {:?}", path.display(), decoder.damage());
 }
 
-fn davis_is_exact(name: &str, sizes: &[usize]) {
-    let bytes = words(name);
-    let expected = read_file(&data(name), None);
+fn davis_is_exact(path: &Path, sizes: &[usize]) {
+    let bytes = words(path);
+    let expected = expected(path);
     let (mut batch, mut decoder) = (EventBatch::default(), DavisWordDecoder::live());
     let (mut counted, mut counter) = (0, DavisWordCounter::new(20));
     in_chunks(&bytes, sizes, |chunk| {
         decoder.decode(chunk, &mut batch);
         counter.count(chunk, |_, events| counted += events);
     });
-    exact(name, &batch.events, &expected, counted);
+    exact(path, &batch.events, &expected, counted);
 }
 
-fn exact(name: &str, events: &[Event], expected: &[Event], counted: u64) {
+/// What others made of a recording, where that lies beside it as CSV; else what reading the file gives.
+fn expected(path: &Path) -> Vec<Event> {
+    let beside = path.with_extension("csv");
+    read_file(if beside.exists() { &beside } else { path }, None)
+}
+
+fn exact(path: &Path, events: &[Event], expected: &[Event], counted: u64) {
     // Millions of events are no message.
-    assert!(events == expected, "{name}: {} events, {} expected", events.len(), expected.len());
-    assert_eq!(counted, expected.len() as u64, "{name}");
+    let (path, found) = (path.display(), events.len());
+    assert!(events == expected, "{path}: {found} events, {} expected", expected.len());
+    assert_eq!(counted, expected.len() as u64, "{path}");
+}
+
+/// Every recording of words in `folder`; the number of them.
+fn folder_is_exact(folder: &Path, sizes: &[usize]) -> usize {
+    let mut paths: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    let mut recordings = 0;
+    for path in paths {
+        let Ok(recording) = Recording::open(&path, None) else { continue };
+        match (recording.format(), recording.geometry()) {
+            (Format::Evt3, Some(geometry)) => evt3_is_exact(&path, geometry, sizes),
+            (Format::DavisWords, _) => davis_is_exact(&path, sizes),
+            _ => continue,
+        }
+        recordings += 1;
+    }
+    recordings
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
-    fn evt3_recordings(sizes in sizes()) {
-        evt3_is_exact("evt3_hd_1280x720_trigger.raw", Geometry { width: 1280, height: 720 }, &sizes);
-        evt3_is_exact("evt3_vga_640x480_trigger.raw", Geometry { width: 640, height: 480 }, &sizes);
-    }
-
-    #[test]
-    fn davis_recordings(sizes in sizes()) {
-        davis_is_exact("davis346_usb_words_made.bin", &sizes);
-        davis_is_exact("davis346_usb_words_made_stall.bin", &sizes);
+    fn recordings_in_chunks(sizes in sizes()) {
+        prop_assert_eq!(folder_is_exact(&data(""), &sizes), 4);
+        if let Some(folder) = std::env::var_os("EVFOCUS_RECORDINGS") {
+            prop_assert!(folder_is_exact(Path::new(&folder), &sizes) > 0);
+        }
     }
 }
