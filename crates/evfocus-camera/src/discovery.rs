@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use evfocus_hal::usb::UsbSpeed;
+use evfocus_hal::{DeviceError, DeviceErrorKind};
 
 use crate::{davis346, evk4};
 
@@ -173,6 +174,22 @@ pub fn select<'a>(
         ([], _) => Err(SelectError::NoneAttached { driver }),
         (several, _) => Err(SelectError::Several { found: owned(several) }),
     }
+}
+
+/// What keeps `camera` from being opened, if anything does.
+///
+/// # Errors
+/// It is in use, the user may not open it, or it does not answer as it must; with the remedy.
+pub fn check_access(camera: &FoundCamera) -> Result<(), DeviceError> {
+    let (kind, what) = match &camera.access {
+        Access::Free => return Ok(()),
+        Access::Denied(remedy) => (DeviceErrorKind::PermissionDenied, remedy.as_str()),
+        Access::Busy => {
+            (DeviceErrorKind::Busy, "end the other program; lsof /dev/bus/usb/*/* tells which")
+        }
+        Access::Faulty(what) => (DeviceErrorKind::Protocol, what.as_str()),
+    };
+    Err(DeviceError::new(kind, camera.to_string(), what))
 }
 
 /// What a slow link means for an event camera; `None` for one that is fast enough, or unknown.

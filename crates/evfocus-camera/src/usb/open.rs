@@ -7,7 +7,9 @@ use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, SystemClock};
 use nusb::{DeviceInfo, ErrorKind, MaybeFuture, Speed};
 
 use super::NusbTransport;
-use crate::discovery::{Access, Driver, FoundCamera, KNOWN_DEVICES, KnownDevice, SelectError, select};
+use crate::discovery::{
+    Access, Driver, FoundCamera, KNOWN_DEVICES, KnownDevice, SelectError, check_access, select,
+};
 use crate::evk4;
 
 /// All cameras use their first interface, in their first configuration.
@@ -47,17 +49,7 @@ pub fn open(
         DeviceError::new(kind, driver.to_string(), error.to_string())
     })?;
     let name = chosen.to_string();
-    match &chosen.access {
-        Access::Free => {}
-        Access::Denied(remedy) => {
-            return Err(DeviceError::new(DeviceErrorKind::PermissionDenied, name, remedy));
-        }
-        Access::Busy => {
-            let what = "end the other program; lsof /dev/bus/usb/*/* tells which";
-            return Err(DeviceError::new(DeviceErrorKind::Busy, name, what));
-        }
-        Access::Faulty(what) => return Err(DeviceError::new(DeviceErrorKind::Protocol, name, what)),
-    }
+    check_access(chosen)?;
     let info = attached.iter().find(|(_, info)| location(info) == chosen.location);
     let (_, info) =
         info.ok_or_else(|| DeviceError::new(DeviceErrorKind::Disconnected, &name, "plug it in again"))?;

@@ -1,7 +1,8 @@
 //! Choosing among cameras; this machine's ports.
 
-use evfocus_camera::discovery::{KNOWN_DEVICES, advice_on_speed, select};
+use evfocus_camera::discovery::{KNOWN_DEVICES, advice_on_speed, check_access, select};
 use evfocus_camera::{Access, Driver, FoundCamera, SelectError, usb};
+use evfocus_hal::DeviceErrorKind;
 use evfocus_hal::usb::UsbSpeed;
 
 fn camera(driver: Driver, serial: &str) -> FoundCamera {
@@ -33,7 +34,32 @@ fn of_several_cameras_one_must_be_named() {
     assert_eq!(select(&found, Driver::Davis346, Some("2")), Ok(&found[1]));
     let error = select(&found, Driver::Davis346, Some("3")).unwrap_err();
     assert!(error.to_string().contains("serial number 3 is attached; there is DAVIS346 1"), "{error}");
-    assert_eq!(select(&found, Driver::Evk4, None), Err(SelectError::NoneAttached { driver: Driver::Evk4 }));
+}
+
+#[test]
+fn no_camera_is_said_with_what_to_check() {
+    let found = [camera(Driver::Davis346, "1")];
+    let error = select(&found, Driver::Evk4, None).unwrap_err();
+    assert_eq!(error, SelectError::NoneAttached { driver: Driver::Evk4 });
+    assert_eq!(error.to_string(), "no evk4 is attached; check cable and power, and that lsusb shows it");
+}
+
+#[test]
+fn what_keeps_a_camera_from_being_opened_is_said_with_the_remedy() {
+    let error = |access| {
+        let error = check_access(&FoundCamera { access, ..camera(Driver::Davis346, "7") }).unwrap_err();
+        (error.kind, error.to_string())
+    };
+    let (kind, text) = error(Access::Busy);
+    assert_eq!(kind, DeviceErrorKind::Busy);
+    assert!(text.contains("DAVIS346 7 at usb1:7") && text.contains("end the other program"), "{text}");
+    let (kind, text) = error(Access::Denied("install the udev rule".to_owned()));
+    assert_eq!(kind, DeviceErrorKind::PermissionDenied);
+    assert!(text.contains("DAVIS346 7") && text.contains("install the udev rule"), "{text}");
+    let (kind, text) = error(Access::Faulty("system number 0x00".to_owned()));
+    assert_eq!(kind, DeviceErrorKind::Protocol);
+    assert!(text.contains("system number 0x00"), "{text}");
+    assert_eq!(check_access(&camera(Driver::Davis346, "7")), Ok(()));
 }
 
 #[test]
