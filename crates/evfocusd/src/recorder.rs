@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use evfocus_core::controller::DeviceFailure;
-use evfocus_core::{ClockEvent, ClockMap, EventBatch, HostMicros, LensSample};
+use evfocus_core::{CameraMicros, ClockEvent, ClockMap, EventBatch, HostMicros, LensSample};
 use evfocus_hal::{Clock, SystemClock};
 use evfocus_record::RecordError;
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -127,8 +127,8 @@ impl StopRecording {
     }
 }
 
-/// Records with the devices of `config`, which have been opened when `started` is called, until the plan is fulfilled, `stop` is used, or something fails. Whatever ends it, the files
-/// are complete up to there.
+/// Records with the devices of `config` until the plan is fulfilled, `stop` is used, or something fails. Whatever ends it, the files are
+/// complete up to there. `started` is called once the devices are open.
 ///
 /// # Errors
 /// [`RecordingError`], which says what was recorded all the same.
@@ -179,7 +179,7 @@ pub fn record(
         lens_notices: lens_notices_out,
         map: ClockMap::new(None),
         waiting: Vec::new(),
-        span: None,
+        began: None,
         recorded: Recorded::default(),
         sweeper: plan.sweep.then(|| Sweeper::new(&lens_info)),
     };
@@ -215,8 +215,8 @@ struct Recorder {
     map: ClockMap,
     /// Samples that are not yet on the camera's clock, oldest first.
     waiting: Vec<LensSample>,
-    /// First and newest camera time.
-    span: Option<(i64, i64)>,
+    /// The first camera time.
+    began: Option<CameraMicros>,
     recorded: Recorded,
     sweeper: Option<Sweeper>,
 }
@@ -274,7 +274,9 @@ impl Recorder {
     }
 
     fn take_batches(&mut self) -> Result<(), RecordError> {
-        while let Ok(mut batch) = self.filled.pop() {
+        // No more than there are batches: a camera that fills them as fast as they are written must not keep a stop from being seen.
+        for _ in 0..BATCHES {
+            let Ok(mut batch) = self.filled.pop() else { break };
             self.recorded.lost += batch.lost;
             if let Some(reached) = batch.reached {
                 if self.map.observe(reached, batch.arrival) == ClockEvent::Reset {
@@ -283,9 +285,8 @@ impl Recorder {
                     self.waiting.clear();
                 }
                 let first = batch.events.first().map_or(reached, |event| event.t);
-                let (begin, _) = self.span.unwrap_or((first.0, reached.0));
-                self.span = Some((begin, reached.0));
-                self.recorded.seconds = reached.0.saturating_sub(begin) as f64 * 1e-6;
+                let began = *self.began.get_or_insert(first);
+                self.recorded.seconds = reached.micros_since(began) as f64 * 1e-6;
             }
             self.files.write(&batch.events)?;
             self.recorded.events += batch.events.len() as u64;
