@@ -56,7 +56,7 @@ pub fn examine(config: &Config) -> Vec<Finding> {
     let machine = Machine::new(Path::new("/"));
     let mut findings = cameras(&config.camera);
     findings.push(lens(&config.lens));
-    let needs_usb = config.camera != CameraConfig::Simulated;
+    let needs_usb = config.camera.driver().is_some();
     findings.push(machine.udev_rule(needs_usb));
     findings.push(machine.usb_memory(needs_usb));
     findings.push(machine.governor());
@@ -72,7 +72,7 @@ pub fn examine(config: &Config) -> Vec<Finding> {
 fn cameras(wanted: &CameraConfig) -> Vec<Finding> {
     const CHECK: &str = "camera";
     let Some(driver) = wanted.driver() else {
-        return vec![Finding::good(CHECK, "simulated")];
+        return vec![Finding::good(CHECK, wanted.name())];
     };
     let found = match usb::list() {
         Ok(found) => found,

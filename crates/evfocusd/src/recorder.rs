@@ -21,6 +21,7 @@ use crate::threads::camera::{BATCH_EVENTS, BATCHES, CameraThread};
 use crate::threads::lens::{LensThread, SAMPLES};
 use crate::threads::orders::{OrderSender, orders};
 use crate::threads::{NOTICES, Notice, StopFlag};
+use crate::vitals::Vitals;
 use files::Files;
 pub use files::positions_beside;
 use sweep::Sweeper;
@@ -152,6 +153,7 @@ pub fn record(
     let (lens_notices, lens_notices_out) = RingBuffer::new(NOTICES);
     let (orders_in, orders_out) = orders();
     let (control, camera_stop) = (std::thread::current(), StopFlag::default());
+    let vitals = Vitals::default();
     let camera = CameraThread {
         camera: devices.camera,
         clock: Arc::clone(&clock),
@@ -169,8 +171,10 @@ pub fn record(
         samples: samples_in,
         notices: lens_notices,
         control,
+        vitals: vitals.clone(),
     };
     let mut recorder = Recorder {
+        vitals,
         files,
         empty,
         filled,
@@ -206,6 +210,8 @@ fn spawn(name: &'static str, body: impl FnOnce() + Send + 'static) -> Result<Joi
 
 /// The recording under way.
 struct Recorder {
+    /// Tells the lens's thread that this one still looks after it.
+    vitals: Vitals,
     files: Files,
     empty: Producer<EventBatch>,
     filled: Consumer<EventBatch>,
@@ -246,6 +252,7 @@ impl Recorder {
         let mut sweep_ended = None;
         loop {
             std::thread::park_timeout(NAP);
+            self.vitals.beat();
             let now = clock.now();
             self.take_batches()?;
             self.take_samples(HostMicros(now.0.saturating_sub(SETTLE_US)))?;

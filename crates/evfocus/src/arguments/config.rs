@@ -6,7 +6,7 @@ use clap::Args;
 use evfocusd::{Config, ConfigError};
 
 /// Which configuration.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct ConfigArguments {
     /// The daemon's configuration (TOML), which names camera and lens; without one, the simulated rig
     #[arg(long, value_name = "FILE")]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use evfocus_record::{ReplayEnd, ReplayPace};
 use evfocusd::config::CameraConfig;
-use evfocusd::{daemon, logging};
+use evfocusd::{Config, ConfigError, daemon, logging};
 use tokio::signal::unix::{SignalKind, signal};
 
 use crate::arguments::ConfigArguments;
@@ -14,7 +14,7 @@ use crate::exit::Exit;
 use crate::files::must_not_be_folder;
 
 /// Run the daemon with a recording in place of the camera
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 Examples:
   evfocus replay sweep.raw --socket /tmp/replay.sock &
@@ -54,27 +54,35 @@ enum End {
     Disconnect,
 }
 
+impl Arguments {
+    /// The configuration, with the recording for a camera.
+    fn configuration(&self) -> Result<Config, ConfigError> {
+        let mut config = self.config.read()?;
+        config.camera = CameraConfig::Replay {
+            file: self.file.clone(),
+            pace: match self.pace {
+                Pace::RealTime => ReplayPace::RealTime,
+                Pace::Fastest => ReplayPace::AsFastAsPossible,
+            },
+            end: match self.end {
+                End::Repeat => ReplayEnd::Repeat,
+                End::Disconnect => ReplayEnd::Disconnect,
+            },
+        };
+        if let Some(socket) = &self.socket {
+            config.socket.clone_from(socket);
+        }
+        if let Some(state_dir) = &self.state_dir {
+            config.state_dir.clone_from(state_dir);
+        }
+        Ok(config)
+    }
+}
+
 /// Runs until it is told to stop.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     must_not_be_folder(&arguments.file, "recording")?;
-    let mut config = arguments.config.read()?;
-    config.camera = CameraConfig::Replay {
-        file: arguments.file.clone(),
-        pace: match arguments.pace {
-            Pace::RealTime => ReplayPace::RealTime,
-            Pace::Fastest => ReplayPace::AsFastAsPossible,
-        },
-        end: match arguments.end {
-            End::Repeat => ReplayEnd::Repeat,
-            End::Disconnect => ReplayEnd::Disconnect,
-        },
-    };
-    if let Some(socket) = &arguments.socket {
-        config.socket.clone_from(socket);
-    }
-    if let Some(state_dir) = &arguments.state_dir {
-        config.state_dir.clone_from(state_dir);
-    }
+    let config = arguments.configuration()?;
     logging::start();
     block_on(async {
         let (mut interrupt, mut terminate) =
@@ -85,7 +93,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
                 _ = terminate.recv() => {}
             }
         };
-        daemon::run(config, || {}, shutdown).await
+        let arguments = arguments.clone();
+        daemon::run(config, Box::new(move || arguments.configuration()), || {}, shutdown).await
     })?;
     Ok(Exit::Done)
 }
