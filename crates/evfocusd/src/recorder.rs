@@ -249,7 +249,7 @@ impl Recorder {
         stop: &StopFlag,
     ) -> Result<(), Trouble> {
         let mut flushed = clock.now();
-        let mut sweep_ended = None;
+        let mut sweep_ended: Option<HostMicros> = None;
         loop {
             std::thread::park_timeout(NAP);
             self.vitals.beat();
@@ -265,11 +265,15 @@ impl Recorder {
             }
             self.take_notices()?;
             let Some(sweeper) = &mut self.sweeper else { continue };
-            match sweep_ended {
-                None if sweeper.step(now, orders).map_err(Trouble::Lens)? => sweep_ended = Some(now),
-                // What happened while the lens moved may still be on its way.
-                Some(ended) if self.is_recorded(ended) || now.since(ended) > LONGEST_DELAY => return Ok(()),
-                None | Some(_) => {}
+            let Some(ended) = sweep_ended else {
+                if sweeper.step(now, orders).map_err(Trouble::Lens)? {
+                    sweep_ended = Some(now);
+                }
+                continue;
+            };
+            // What happened while the lens moved may still be on its way.
+            if self.is_recorded(ended) || now.since(ended) > LONGEST_DELAY {
+                return Ok(());
             }
         }
     }
