@@ -184,9 +184,7 @@ pub fn check_access(camera: &FoundCamera) -> Result<(), DeviceError> {
     let (kind, what) = match &camera.access {
         Access::Free => return Ok(()),
         Access::Denied(remedy) => (DeviceErrorKind::PermissionDenied, remedy.as_str()),
-        Access::Busy => {
-            (DeviceErrorKind::Busy, "end the other program; lsof /dev/bus/usb/*/* tells which")
-        }
+        Access::Busy => (DeviceErrorKind::Busy, "end the other program; lsof /dev/bus/usb/*/* tells which"),
         Access::Faulty(what) => (DeviceErrorKind::Protocol, what.as_str()),
     };
     Err(DeviceError::new(kind, camera.to_string(), what))
