@@ -4,6 +4,15 @@
 //! of their own beyond a partial word. For [`Evt3Decoder`] and [`DavisWordDecoder`] there is a counter that counts the same
 //! events without looking at their coordinates: [`Evt3Counter`], [`DavisWordCounter`].
 
+#![expect(
+    clippy::inline_always,
+    reason = "what is to use the vector instructions of a function must be inlined into it"
+)]
+#![expect(
+    clippy::needless_bitwise_bool,
+    reason = "without a branch, so that the compiler can take many words at a time"
+)]
+
 mod bins;
 pub mod davis;
 mod evt2;

@@ -95,7 +95,7 @@ pub enum RecordingError {
     #[error("{cause}; {} events are in it; make room, or choose another place, and record again", recorded.events)]
     Write {
         /// Which file, and why.
-        cause: RecordError,
+        cause: Box<RecordError>,
         /// What is in the files.
         recorded: Recorded,
     },
@@ -363,7 +363,7 @@ impl Recorder {
         };
         match trouble {
             None => Ok(recorded),
-            Some(Trouble::Write(cause)) => Err(RecordingError::Write { cause, recorded }),
+            Some(Trouble::Write(cause)) => Err(RecordingError::Write { cause: Box::new(cause), recorded }),
             Some(Trouble::Camera(what)) => Err(RecordingError::Camera { what, recorded }),
             Some(Trouble::Lens(what)) => Err(RecordingError::Lens { what, recorded }),
         }

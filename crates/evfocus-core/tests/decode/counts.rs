@@ -148,10 +148,10 @@ proptest! {
                 0 => time += payload % 9,
                 1 if payload % 64 == 0 => stream.push([0x7002, 0x0001, 0x7001][usize::from(payload >> 6) % 3]),
                 2 if payload % 64 == 0 => time = time.saturating_sub(payload >> 14),
-                3 => stream.push(0x1000 | payload % 346),
+                3 => stream.push(0x1000 | (payload % 346)),
                 4 => stream.push(0x4000 | payload & 0x2FFF),
                 5..10 => stream.push(0x8000 | time),
-                _ => stream.push(0x2000 | payload & 0x1000 | payload % 260),
+                _ => stream.push(0x2000 | payload & 0x1000 | (payload % 260)),
             }
         }
         let bytes = bytes_of(&stream);

@@ -69,7 +69,10 @@ impl Files {
         };
         let files =
             events.and_then(|events| Ok(Self { events, positions: PositionsWriter::create(&beside)? }));
-        files.map_err(|cause| RecordingError::Write { cause, recorded: super::Recorded::default() })
+        files.map_err(|cause| RecordingError::Write {
+            cause: Box::new(cause),
+            recorded: super::Recorded::default(),
+        })
     }
 
     pub(super) fn write(&mut self, events: &[Event]) -> Result<(), RecordError> {
@@ -113,7 +116,7 @@ fn claim(path: &Path) -> Result<(), RecordingError> {
             Err(RecordingError::Exists { path: path.to_owned() })
         }
         Err(source) => {
-            let cause = RecordError::Write { path: path.to_owned(), source };
+            let cause = Box::new(RecordError::Write { path: path.to_owned(), source });
             Err(RecordingError::Write { cause, recorded: super::Recorded::default() })
         }
     }

@@ -150,6 +150,10 @@ struct Seen {
 impl BinOfWords {
     /// What the first `count` words of `block` hold. Nothing here branches on a word, so that the compiler can look at many at once.
     #[inline(always)]
+    #[expect(
+        clippy::explicit_counter_loop,
+        reason = "16 bits wide, as the words are: numbers of one width go through the vector registers together"
+    )]
     fn look(self, block: &[[u8; 2]; BLOCK], count: usize) -> Seen {
         let count = count as u16;
         let (mut events, mut newest, mut leaving) = (0, 0, count);
