@@ -46,6 +46,8 @@ const ARROWS: [(&str, &[&str]); 11] = [
             "evfocus-core",
             "evfocus-eval",
             "evfocus-hal",
+            "evfocus-ipc",
+            "evfocus-lens",
             "evfocus-record",
             "evfocusd",
             "hil-sim",

@@ -127,8 +127,10 @@ fn garbage_in_mid_sweep_is_named_and_the_lens_stopped() -> Result<()> {
 
 #[test]
 fn a_lens_that_sticks_in_mid_sweep_does_not_focus() -> Result<()> {
-    for came in strike_all(MidSweep::Stalled)? {
-        assert!(!["focused", "aborted", "none"].contains(&came.reason), "{came}");
+    for (lens, came) in LENSES.iter().zip(strike_all(MidSweep::Stalled)?) {
+        // A lens without read-back is where it was told to be, as far as anybody can tell.
+        let is_seen = lens.name != "optotune";
+        assert!(!is_seen || !["focused", "aborted", "none"].contains(&came.reason), "{came}");
     }
     Ok(())
 }

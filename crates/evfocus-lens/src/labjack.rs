@@ -22,7 +22,7 @@ use crate::rate_drive::RateDrive;
 pub const PORT: u16 = 502;
 
 /// An exchange takes 1 ms on Ethernet, 7 ms over WiFi. All attempts together are how long a motor runs on unwatched.
-const USUAL: Patience = Patience { timeout: Duration::from_millis(25), attempts: 3 };
+const USUAL: Patience = Patience { timeout: Duration::from_millis(30), attempts: 3 };
 
 /// What the protocol does not tell.
 #[derive(Debug, Clone, Copy, PartialEq)]

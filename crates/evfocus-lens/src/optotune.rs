@@ -33,8 +33,6 @@ const USUAL: Patience = Patience { timeout: Duration::from_millis(100), attempts
 const GREETING: Patience = Patience { timeout: Duration::from_millis(500), attempts: 3 };
 /// However seldom the samples come, a step is no longer than the way of this time.
 const LONGEST_STEP: Duration = Duration::from_millis(20);
-/// How often a set-point is read back while the staircase goes on: each takes time in which no step can leave.
-const CHECK: Duration = Duration::from_millis(25);
 /// The glass has settled when it is this near to its rest, counts,
 const SETTLED: f64 = 1.0;
 /// and this slow, counts per second.
@@ -83,8 +81,6 @@ pub struct Optotune {
     /// The set-point before.
     before: i16,
     sweep: Option<Sweep>,
-    /// When the set-point was read back last.
-    checked: HostMicros,
     response: Response,
 }
 
@@ -98,8 +94,7 @@ impl Optotune {
         let mut line = Line::new("Optotune Lens Driver", port, clock);
         let Greeting { serial, range, set_point } = greet(&mut line, config.quantity)?;
         let response = Response::new(config.response, line.now(), f64::from(set_point));
-        let checked = line.now();
-        Ok(Self { line, config, serial, range, set_point, before: set_point, sweep: None, checked, response })
+        Ok(Self { line, config, serial, range, set_point, before: set_point, sweep: None, response })
     }
 
     fn ready(&mut self) -> Result<(), DeviceError> {
@@ -248,10 +243,7 @@ impl Lens for Optotune {
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         self.ready()?;
         self.step()?;
-        if self.sweep.is_none() || self.line.now().since(self.checked) >= CHECK {
-            self.check()?;
-            self.checked = self.line.now();
-        }
+        self.check()?;
         let now = self.line.now();
         let (position, velocity) = self.response.at(now);
         let is_settled =

@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use evfocus_core::controller::DeviceFailure;
-use evfocus_core::{CameraMicros, ClockEvent, ClockMap, EventBatch, HostMicros, LensSample};
+use evfocus_core::{CameraMicros, ClockEvent, ClockMap, Event, EventBatch, HostMicros, LensSample};
 use evfocus_hal::{Clock, SystemClock};
 use evfocus_record::RecordError;
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -32,6 +32,8 @@ const NAP: Duration = Duration::from_millis(2);
 const FLUSH: Duration = Duration::from_secs(1);
 /// How long the camera may take to send what happened before the sweep was over; a simulated one on a busy computer is slow.
 const LONGEST_DELAY: Duration = Duration::from_secs(10);
+/// A recorded sweep begins after this long even if the lens has not answered, seconds.
+const LONGEST_WAIT_FOR_THE_LENS_S: f64 = 1.0;
 /// Positions are put on the camera's clock so many microseconds after they came: by then it is known better.
 const SETTLE_US: i64 = 2_000_000;
 
@@ -183,6 +185,7 @@ pub fn record(
         lens_notices: lens_notices_out,
         map: ClockMap::new(None),
         waiting: Vec::new(),
+        from: None,
         began: None,
         recorded: Recorded::default(),
         sweeper: plan.sweep.then(|| Sweeper::new(&lens_info)),
@@ -221,6 +224,8 @@ struct Recorder {
     map: ClockMap,
     /// Samples that are not yet on the camera's clock, oldest first.
     waiting: Vec<LensSample>,
+    /// A recorded sweep begins here: where the lens was before its first answer nobody knows.
+    from: Option<CameraMicros>,
     /// The first camera time.
     began: Option<CameraMicros>,
     recorded: Recorded,
@@ -299,8 +304,10 @@ impl Recorder {
                 let began = *self.began.get_or_insert(first);
                 self.recorded.seconds = reached.micros_since(began) as f64 * 1e-6;
             }
-            self.files.write(&batch.events)?;
-            self.recorded.events += batch.events.len() as u64;
+            let unknown = self.unknown(&batch.events);
+            let events = batch.events.get(unknown..).unwrap_or_default();
+            self.files.write(events)?;
+            self.recorded.events += events.len() as u64;
             batch.clear();
             // There is a place for every batch, so the way back is never full.
             if self.empty.push(batch).is_err() {
@@ -308,6 +315,17 @@ impl Recorder {
             }
         }
         Ok(())
+    }
+
+    /// How many of `events` came before the lens's first answer; of use to nobody in a recorded sweep.
+    fn unknown(&mut self, events: &[Event]) -> usize {
+        if self.sweeper.is_none() {
+            return 0;
+        }
+        let answered = self.waiting.first().and_then(|first| self.map.to_camera(first.time()).ok());
+        let late = self.began.filter(|_| self.recorded.seconds > LONGEST_WAIT_FOR_THE_LENS_S);
+        self.from = self.from.or(answered).or(late);
+        self.from.map_or(events.len(), |from| events.partition_point(|event| event.t < from))
     }
 
     /// Takes the lens's answers, and writes those that came before `settled`.

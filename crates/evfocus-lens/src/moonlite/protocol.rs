@@ -77,15 +77,23 @@ impl Command {
     }
 }
 
-/// A position: hex digits, at least one and at most eight, then `#`. A `#` that comes first belongs to an earlier answer.
+/// Digits of a position, at least; other answers are shorter.
+const POSITION_DIGITS: usize = 3;
+
+/// A position: hex digits, four or more from every firmware that is known, at most eight, then `#`.
 pub(crate) fn position(bytes: &[u8]) -> Answer<u32> {
-    let start = bytes.iter().position(|&byte| byte != b'#').unwrap_or(bytes.len());
-    let rest = bytes.get(start..).unwrap_or_default();
-    let mut value: u32 = 0;
-    for (index, &byte) in rest.iter().enumerate() {
+    number(bytes, |digits| digits >= POSITION_DIGITS)
+}
+
+/// The first number of as many hex digits as `fits` wants, then `#`. Others, and a `#` that comes first, belong to an earlier question
+/// whose answer was late.
+fn number(bytes: &[u8], fits: impl Fn(usize) -> bool) -> Answer<u32> {
+    let (mut value, mut digits): (u32, usize) = (0, 0);
+    for &byte in bytes {
         match char::from(byte).to_digit(16) {
-            Some(digit) if index < 8 => value = value << 4 | digit,
-            None if byte == b'#' => return Answer::Whole(value),
+            Some(digit) if digits < 8 => (value, digits) = (value << 4 | digit, digits + 1),
+            None if byte == b'#' && fits(digits) => return Answer::Whole(value),
+            None if byte == b'#' => (value, digits) = (0, 0),
             Some(_) | None => return Answer::Wrong("not hex digits and #"),
         }
     }
@@ -94,7 +102,7 @@ pub(crate) fn position(bytes: &[u8]) -> Answer<u32> {
 
 /// `01#` or `00#`, or one digit.
 pub(crate) fn is_moving(bytes: &[u8]) -> Answer<bool> {
-    match position(bytes) {
+    match number(bytes, |digits| (1..POSITION_DIGITS).contains(&digits)) {
         Answer::Whole(value @ (0 | 1)) => Answer::Whole(value == 1),
         Answer::Whole(_) => Answer::Wrong("neither 0 nor 1"),
         Answer::Wrong(why) => Answer::Wrong(why),
@@ -127,6 +135,9 @@ mod tests {
         assert_eq!(position(b"1064#"), Answer::Whole(4196));
         assert_eq!(position(b"186A0#"), Answer::Whole(100_000));
         assert_eq!(position(b"#1064#"), Answer::Whole(4196));
+        // Late answers to other questions.
+        assert_eq!(position(b"00#1064#"), Answer::Whole(4196));
+        assert_eq!(is_moving(b"1064#01#"), Answer::Whole(true));
         assert_eq!(position(b"106"), Answer::Incomplete);
         assert!(matches!(position(b"10x4#"), Answer::Wrong(_)));
         assert!(matches!(position(b"123456789#"), Answer::Wrong(_)));

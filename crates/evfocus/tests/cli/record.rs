@@ -70,7 +70,7 @@ fn a_recorded_sweep_can_be_analyzed() {
         );
         // A machine that is too busy loses events, and says so.
         if recorded["lost"] == 0 {
-            assert!((number(&analysis["result"], "position") - 1985.0).abs() < 40.0, "{analysis}");
+            assert!((number(&analysis, "position") - 1985.0).abs() < 40.0, "{analysis}");
         }
         assert_eq!(json(&["info", text(&file), "--json"])["events"], recorded["events"]);
     }
