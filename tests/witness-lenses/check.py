@@ -85,15 +85,6 @@ def grbl():
             until("it jogs", lambda: emulator.glass == 1000)
             until("it reads where it went", lambda: machine.cmpos[0] == 10 and machine.cmode == "Idle")
             check("it jogs to its target and reads that", True, machine.cmpos)
-            machine.send_immediately("$J=G91 X20.000 F600")
-            until("it moves", lambda: machine.cmpos[0] > 11)
-            machine.softreset()
-            standing = emulator.stands(0.5)
-            check("a reset stops it on the way", standing is not None and 1100 < standing < 3000, standing)
-            until("it is locked", lambda: machine.cmode == "Alarm")
-            machine.killalarm()
-            until("it is unlocked", lambda: machine.cmode == "Idle")
-            check("it is locked then, and unlocked", True)
         finally:
             machine.disconnect()
 
