@@ -28,10 +28,9 @@ pub const BAUD: u32 = 115_200;
 /// Longest wait for a status report or an `ok`.
 const ANSWER: Duration = Duration::from_millis(300);
 const ATTEMPTS: u32 = 3;
-/// A motor whose controller is silent is stopped within 100 ms; question and answer take 3 to 12. One long wait: an answer is late
-/// more often than it is lost.
-const MOVING_ANSWER: Duration = Duration::from_millis(80);
-const MOVING_ATTEMPTS: u32 = 1;
+/// A motor whose controller is silent is stopped within 100 ms; question and answer take 3 to 12.
+const MOVING_ANSWER: Duration = Duration::from_millis(40);
+const MOVING_ATTEMPTS: u32 = 2;
 /// An idle machine this near to its target has arrived, steps.
 const ARRIVED: f64 = 1.5;
 /// A jog that was taken and does not show by then has ended before anybody looked.

@@ -25,9 +25,9 @@ pub const BAUD: u32 = 9600;
 
 /// Question and answer take 10 ms; a firmware that steps in its main loop may be as late as this.
 const USUAL: Patience = Patience { timeout: Duration::from_millis(300), attempts: 3 };
-/// A motor whose controller is silent is stopped within 100 ms; question and answer take 10, on a busy host behind an adapter that
-/// gathers for 16 ms some 50. One long wait: an answer is late more often than it is lost.
-const MOVING: Patience = Patience { timeout: Duration::from_millis(80), attempts: 1 };
+/// A motor whose controller is silent is stopped within 100 ms; question and answer take 10, behind an adapter that
+/// gathers for 16 ms some 30.
+const MOVING: Patience = Patience { timeout: Duration::from_millis(40), attempts: 2 };
 /// Opening the port resets an Arduino, which is deaf for up to 2 s.
 const BOOTING: Patience = Patience { timeout: Duration::from_secs(1), attempts: 3 };
 /// A motor that has stood for this long away from its target, and says that it does not move, has been stopped.

@@ -86,7 +86,7 @@ fn what_is_wrong_with_the_line_is_named() {
 fn slow_answers_are_waited_for() {
     let bench = bench();
     let mut lens = open(&bench).unwrap();
-    bench.wire.strike(WireFault::SlowReplies(Duration::from_millis(30)));
+    bench.wire.strike(WireFault::SlowReplies(Duration::from_millis(15)));
     lens.move_to(LensPosition(1000.0), config().max_speed).unwrap();
     assert!(bench.rest(&mut lens, Duration::from_secs(3)).position.distance(LensPosition(1000.0)) < 1.0);
 }
