@@ -7,7 +7,18 @@ import sys
 import varlink
 
 INTERFACE = "org.evfocus.Controller"
-METHODS = ["GetStatus", "Focus", "Abort", "MoveTo", "SetMode", "Monitor", "GetReport", "ListDevices"]
+METHODS = [
+    "GetStatus",
+    "Focus",
+    "Abort",
+    "MoveTo",
+    "Calibrate",
+    "SetMode",
+    "Monitor",
+    "GetReport",
+    "ListDevices",
+    "Reload",
+]
 
 
 def check(what, holds, detail=""):
