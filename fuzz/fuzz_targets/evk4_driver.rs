@@ -4,11 +4,9 @@
 use std::sync::Arc;
 
 use evfocus_camera::evk4::{Evk4, Settings};
+use evfocus_fuzz::device;
 use evfocus_hal::VirtualClock;
 use libfuzzer_sys::fuzz_target;
-
-#[path = "../src/device.rs"]
-mod device;
 
 fuzz_target!(|data: &[u8]| {
     let clock = Arc::new(VirtualClock::new());

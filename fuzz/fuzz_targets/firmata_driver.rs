@@ -1,12 +1,10 @@
 //! The driver behind a line that spoils what comes over it.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
+use evfocus_fuzz::lens;
 use evfocus_lens::firmata::{Firmata, FirmataConfig};
 use hil_sim::wire::Protocol;
-
-#[path = "../src/lens.rs"]
-mod lens;
+use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     let config = FirmataConfig { pwm_pin: 3, direction_pin: 4, channel: 0, drive: lens::drive() };

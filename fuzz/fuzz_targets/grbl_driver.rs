@@ -1,12 +1,10 @@
 //! The driver behind a line that spoils what comes over it.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
+use evfocus_fuzz::lens;
 use evfocus_lens::grbl::{Grbl, GrblConfig, protocol::Axis};
 use hil_sim::wire::Protocol;
-
-#[path = "../src/lens.rs"]
-mod lens;
+use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     let config = GrblConfig { axis: Axis::X, range: lens::range(), needs_homing: false };

@@ -4,11 +4,9 @@
 use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
 
+use evfocus_fuzz::lens;
 use evfocus_lens::indi::{Indi, IndiConfig};
 use hil_sim::wire::Protocol;
-
-#[path = "../src/lens.rs"]
-mod lens;
 
 fuzz_target!(|data: &[u8]| {
     let config = IndiConfig {

@@ -1,12 +1,10 @@
 //! The driver behind a line that spoils what comes over it.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
+use evfocus_fuzz::lens;
 use evfocus_lens::optotune::{Optotune, OptotuneConfig, Quantity, ResponseConfig};
 use hil_sim::wire::Protocol;
-
-#[path = "../src/lens.rs"]
-mod lens;
+use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     let quantity = if data.len() % 2 == 0 { Quantity::Current } else { Quantity::FocalPower };

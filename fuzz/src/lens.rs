@@ -45,7 +45,9 @@ impl Transport for Spoilt {
             Some(128..=199) => {
                 let count = usize::from(take(&self.data).unwrap_or(0)).min(buffer.len());
                 let mut came = 0;
-                for (place, byte) in buffer.iter_mut().take(count).zip(std::iter::from_fn(|| take(&self.data))) {
+                for (place, byte) in
+                    buffer.iter_mut().take(count).zip(std::iter::from_fn(|| take(&self.data)))
+                {
                     *place = byte;
                     came += 1;
                 }
@@ -104,7 +106,10 @@ pub fn fuzz<L: Lens>(
                 let speed = 1.0 + 8.0 * f64::from(take(&data).unwrap_or(0));
                 let range = lens.info().range;
                 let moved = lens.move_to(LensPosition(target), LensSpeed::new(speed).unwrap());
-                assert!(moved.is_err() || range.contains(LensPosition(target)), "{target} outside of {range}");
+                assert!(
+                    moved.is_err() || range.contains(LensPosition(target)),
+                    "{target} outside of {range}"
+                );
             }
             5 => drop(lens.stop()),
             6 => drop(lens.home()),
@@ -120,17 +125,16 @@ fn check_time(began: HostMicros, ended: HostMicros, what: &str) {
 }
 
 /// Positions of the model's lens.
-#[allow(dead_code, reason = "not every target needs it")]
 pub fn range() -> LensRange {
     LensConfig::default().range
 }
 
-#[allow(dead_code, reason = "not every target needs it")]
+/// Its full speed.
 pub fn speed() -> LensSpeed {
     LensConfig::default().max_speed
 }
 
-#[allow(dead_code, reason = "not every target needs it")]
+/// How to steer the model's motor.
 pub fn drive() -> DriveConfig {
     DriveConfig {
         range: range(),
