@@ -9,16 +9,13 @@ const FOUND: [u64; 1] = [372];
 #[test]
 fn no_invariant_is_broken() -> Result<()> {
     let mut seen = std::collections::BTreeSet::new();
-    let mut idle = 0;
     for seed in (1..=150).chain(FOUND) {
         let trial = Trial::draw(seed)?;
         let ended = trial.run().with_context(|| format!("seed {seed}"))?;
         assert!(ended.broken.is_empty(), "seed {seed}, {:?}: {:?}", trial.mishaps, ended.broken);
-        idle += u32::from(ended.outcomes.is_empty());
+        assert!(!ended.outcomes.is_empty(), "seed {seed}: a call to focus came to nothing");
         seen.extend(trial.mishaps);
     }
-    // What is away from the beginning cannot be focused with.
-    assert!(idle <= 10, "{idle} trials made no run");
     assert_eq!(seen.len(), Mishap::ALL.len(), "a mishap that never happens proves nothing: {seen:?}");
     Ok(())
 }

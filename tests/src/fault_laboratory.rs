@@ -98,7 +98,7 @@ pub struct Trial {
 /// How a trial went.
 #[derive(Debug, Clone)]
 pub struct Ended {
-    /// How each run ended, by `focused`, `aborted` or the reason.
+    /// How each call to focus ended, by `focused`, `aborted`, `killed`, `refused` or the reason.
     pub outcomes: Vec<&'static str>,
     /// The invariants that did not hold, in words.
     pub broken: Vec<String>,
@@ -202,10 +202,10 @@ impl Trial {
                 killed = None;
                 life = life.kill(self, &mut judge)?;
                 // Who had called has lost the connection, and calls again.
-                judge.command(&mut life.rig, Command::Focus(self.request), life.age);
+                judge.command(&mut life.rig, Command::Focus(self.request));
             }
             while let Some((_, command)) = commands.next_if(|(time, _)| *time <= life.now()) {
-                judge.command(&mut life.rig, *command, life.age);
+                judge.command(&mut life.rig, *command);
             }
             life.rig.step();
             judge.watch(&life.rig, &life.witness, life.age);

@@ -32,7 +32,7 @@ pub(super) struct Judge {
 
 impl Judge {
     /// Gives `rig` a command, as a client does.
-    pub(super) fn command(&mut self, rig: &mut VirtualRig, command: Command, _age: Duration) {
+    pub(super) fn command(&mut self, rig: &mut VirtualRig, command: Command) {
         match rig.command(command) {
             Ok(accepted) => {
                 if moves(command, accepted) {
@@ -47,7 +47,9 @@ impl Judge {
                     self.run = Some((run, rig.now()));
                 }
             }
-            Err(_refused) => {}
+            // What is away cannot be focused with: whoever asks is told.
+            Err(_) if matches!(command, Command::Focus(_)) => self.outcomes.push("refused"),
+            Err(_) => {}
         }
         self.note_end(rig);
     }
