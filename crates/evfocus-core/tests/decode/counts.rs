@@ -23,6 +23,19 @@ fn decoded(batch: &EventBatch, bin_us: u32) -> (Bins, u64) {
     (bins, batch.lost)
 }
 
+/// The bins that `count` makes of `bytes`, given to it in pieces.
+fn counted(
+    bytes: &[u8],
+    cuts: &[Index],
+    mut count: impl FnMut(&[u8], &mut dyn FnMut(CameraMicros, u64)),
+) -> Bins {
+    let mut bins = Bins::new();
+    in_pieces(bytes, cuts, |piece| {
+        count(piece, &mut |start, events| *bins.entry(start.0).or_default() += events)
+    });
+    bins
+}
+
 /// Words as a camera might send them: mostly columns and vectors, times that mostly rise.
 fn evt3_word() -> impl Strategy<Value = u16> {
     let of = |kind: u16| move |payload: u16| kind << 12 | payload & 0xFFF;
@@ -56,13 +69,9 @@ proptest! {
         }));
         let (mut batch, mut decoder) = (EventBatch::default(), Evt3Decoder::live(Evt3Decoder::MAX_GEOMETRY));
         decoder.decode(&bytes, &mut batch);
-        let (mut bins, mut counter) = (Bins::new(), Evt3Counter::new(bin_us));
-        in_pieces(&bytes, &cuts, |piece| {
-            counter.count(piece, |CameraMicros(start), events| *bins.entry(start).or_default() += events);
-        });
-        let (expected, lost) = decoded(&batch, bin_us);
-        prop_assert_eq!(lost, 0);
-        prop_assert_eq!(bins, expected);
+        let mut counter = Evt3Counter::new(bin_us);
+        let bins = counted(&bytes, &cuts, |piece, bin| counter.count(piece, bin));
+        prop_assert_eq!((bins, 0), decoded(&batch, bin_us));
         prop_assert_eq!(counter.reached(), batch.reached);
     }
 
@@ -84,10 +93,8 @@ proptest! {
     fn davis_counts_are_equal(bytes in vec(any::<u8>(), 0..4000), cuts in vec(any::<Index>(), 0..8)) {
         let (mut batch, mut decoder) = (EventBatch::default(), DavisWordDecoder::live());
         decoder.decode(&bytes, &mut batch);
-        let (mut bins, mut counter) = (Bins::new(), DavisWordCounter::new(20));
-        in_pieces(&bytes, &cuts, |piece| {
-            counter.count(piece, |CameraMicros(start), events| *bins.entry(start).or_default() += events);
-        });
+        let mut counter = DavisWordCounter::new(20);
+        let bins = counted(&bytes, &cuts, |piece, bin| counter.count(piece, bin));
         let (expected, lost) = decoded(&batch, 20);
         prop_assert_eq!(bins.values().sum::<u64>(), batch.events.len() as u64 + lost);
         prop_assert!(expected.iter().all(|(start, events)| bins.get(start) >= Some(events)));
@@ -120,13 +127,9 @@ proptest! {
         let bytes = bytes_of(&stream);
         let (mut batch, mut decoder) = (EventBatch::default(), Evt3Decoder::live(Evt3Decoder::MAX_GEOMETRY));
         decoder.decode(&bytes, &mut batch);
-        let (mut bins, mut counter) = (Bins::new(), Evt3Counter::new(bin_us));
-        in_pieces(&bytes, &cuts, |piece| {
-            counter.count(piece, |CameraMicros(start), events| *bins.entry(start).or_default() += events);
-        });
-        let (expected, lost) = decoded(&batch, bin_us);
-        prop_assert_eq!(lost, 0);
-        prop_assert_eq!(bins, expected);
+        let mut counter = Evt3Counter::new(bin_us);
+        let bins = counted(&bytes, &cuts, |piece, bin| counter.count(piece, bin));
+        prop_assert_eq!((bins, 0), decoded(&batch, bin_us));
         prop_assert_eq!(counter.reached(), batch.reached);
     }
 
@@ -157,13 +160,9 @@ proptest! {
         let bytes = bytes_of(&stream);
         let (mut batch, mut decoder) = (EventBatch::default(), DavisWordDecoder::live());
         decoder.decode(&bytes, &mut batch);
-        let (mut bins, mut counter) = (Bins::new(), DavisWordCounter::new(bin_us));
-        in_pieces(&bytes, &cuts, |piece| {
-            counter.count(piece, |CameraMicros(start), events| *bins.entry(start).or_default() += events);
-        });
-        let (expected, lost) = decoded(&batch, bin_us);
-        prop_assert_eq!(lost, 0);
-        prop_assert_eq!(bins, expected);
+        let mut counter = DavisWordCounter::new(bin_us);
+        let bins = counted(&bytes, &cuts, |piece, bin| counter.count(piece, bin));
+        prop_assert_eq!((bins, 0), decoded(&batch, bin_us));
         prop_assert_eq!(counter.reached(), batch.reached);
     }
 }
