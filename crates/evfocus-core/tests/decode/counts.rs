@@ -31,7 +31,7 @@ fn counted(
 ) -> Bins {
     let mut bins = Bins::new();
     in_pieces(bytes, cuts, |piece| {
-        count(piece, &mut |start, events| *bins.entry(start.0).or_default() += events)
+        count(piece, &mut |start, events| *bins.entry(start.0).or_default() += events);
     });
     bins
 }
