@@ -55,7 +55,12 @@ impl EventStore {
 
     /// All events in the order of arrival.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = Event> + ExactSizeIterator + '_ {
-        self.packed.iter().map(|&packed| self.unpack(packed))
+        self.iter_from(0)
+    }
+
+    /// The events from `index` on, found at once: to skip what was seen before would take as long as to read it.
+    pub fn iter_from(&self, index: usize) -> impl DoubleEndedIterator<Item = Event> + ExactSizeIterator + '_ {
+        self.packed.get(index..).unwrap_or_default().iter().map(|&packed| self.unpack(packed))
     }
 
     /// Index of the first event at or after `micros`, if times do not decrease.

@@ -42,6 +42,7 @@ proptest! {
         let (from, to) = (from.min(to).min(len), from.max(to).min(len));
         let within = store.first_at_or_after_within(from as u64..to as u64, asked_us);
         prop_assert_eq!(within, expected.clamp(from, to));
+        prop_assert!(store.iter_from(to).eq(store.iter().skip(to)) && store.iter_from(len + 1).next().is_none());
     }
 }
 

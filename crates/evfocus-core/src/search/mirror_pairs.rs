@@ -92,7 +92,7 @@ impl MirrorPairs {
     /// Takes the events of `store` that it has not taken yet, up to the time `until`, for which `trace` tells the lens positions.
     pub(super) fn take(&mut self, store: &EventStore, trace: &LensTrace<CameraMicros>, until: CameraMicros) {
         let Some((travel, mut lens, mut next)) = self.progress else { return };
-        for event in store.iter().skip(next).take_while(|event| event.t <= until) {
+        for event in store.iter_from(next).take_while(|event| event.t <= until) {
             let step = lens.at(event.t, trace);
             self.vote(&event, step);
             next += 1;

@@ -97,7 +97,7 @@ impl StructureMeasure {
         mut also: impl FnMut(&Event),
     ) {
         let Some(progress) = &mut self.progress else { return };
-        for event in store.iter().skip(progress.taken.1) {
+        for event in store.iter_from(progress.taken.1) {
             if event.t > until || progress.phase == Phase::Arrived {
                 return;
             }
@@ -125,7 +125,7 @@ impl StructureMeasure {
         let Some(progress) = &mut self.progress else { return };
         self.kernel.begin_again();
         let (from, to) = progress.taken;
-        for event in store.iter().skip(from).take(to.saturating_sub(from)) {
+        for event in store.iter_from(from).take(to.saturating_sub(from)) {
             let step = progress.cursor.at(event.t, trace);
             self.kernel.take_again(&event, step);
         }
