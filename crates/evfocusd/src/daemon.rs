@@ -155,8 +155,12 @@ impl Running {
         let (commands_in, commands_out) = mpsc::channel(COMMANDS);
         let (reports_in, reports_out) = mpsc::channel(REPORTS);
         let (calibrations_in, calibrations_out) = mpsc::channel(1);
-        let (seen_in, seen_out) =
-            watch::channel(Seen { snapshot: controller.snapshot(), calibrating: false, limits });
+        let (seen_in, seen_out) = watch::channel(Seen {
+            snapshot: controller.snapshot(),
+            calibrating: false,
+            limits,
+            lens_moving: false,
+        });
         let (status_in, status_out) = watch::channel(Arc::new(Status::default()));
         let (progress_in, _) = broadcast::channel(PROGRESS);
 

@@ -217,7 +217,7 @@ impl Publisher {
             },
             run_id: snapshot.run.map(|run| run.0),
             lens_position: snapshot.lens.map(|lens| lens.position.0),
-            lens_moving: snapshot.lens.is_some_and(|lens| lens.moving),
+            lens_moving: seen.lens_moving,
             lens_range: Some(wire::lens_range(seen.limits)),
             event_rate: snapshot.event_rate.0,
             events_lost: snapshot.lost,

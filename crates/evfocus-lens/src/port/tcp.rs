@@ -10,8 +10,6 @@ use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Transport};
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 const WRITE_TIMEOUT: Duration = Duration::from_millis(500);
-/// The operating system refuses a timeout of zero.
-const SHORTEST: Duration = Duration::from_micros(1);
 /// Most bytes that are thrown away at once: a peer that never pauses must not hold the lens's thread.
 const MOST_DRAINED: usize = 1 << 20;
 
@@ -48,10 +46,18 @@ impl Tcp {
         DeviceError::new(DeviceErrorKind::Disconnected, &self.address, what)
     }
 
+    /// What is there, after at most `wait`. The operating system has no timeout of zero, and rounds short ones up to its
+    /// scheduler's tick, several milliseconds; hence the other mode for no wait.
     fn read_for(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, DeviceError> {
-        let set = self.stream.set_read_timeout(Some(wait.max(SHORTEST)));
-        set.map_err(|error| self.lost("read", &error))?;
-        match self.stream.read(buffer) {
+        let read = if wait.is_zero() {
+            self.stream.set_nonblocking(true).and_then(|()| {
+                let read = self.stream.read(buffer);
+                self.stream.set_nonblocking(false).and(read)
+            })
+        } else {
+            self.stream.set_read_timeout(Some(wait)).and_then(|()| self.stream.read(buffer))
+        };
+        match read {
             Ok(0) if !buffer.is_empty() => Err(self.lost("read", &"the peer closed the connection")),
             Ok(length) => Ok(length),
             Err(error)

@@ -54,6 +54,8 @@ pub(crate) struct Seen {
     pub(crate) calibrating: bool,
     /// Where the lens may go: as configured, and as far as it was found to go.
     pub(crate) limits: LensRange,
+    /// Whether the lens is on its way, or was sent and has not been asked since it set out.
+    pub(crate) lens_moving: bool,
 }
 
 /// A lens that was calibrated.
@@ -351,10 +353,14 @@ impl ControlThread {
     }
 
     fn seen(&self) -> Seen {
+        let snapshot = self.controller.snapshot();
         Seen {
-            snapshot: self.controller.snapshot(),
+            snapshot,
             calibrating: self.desk.is_calibrating(),
             limits: self.controller.config().limits,
+            lens_moving: snapshot
+                .lens
+                .is_some_and(|lens| lens.moving || lens.requested < self.orders.obeyed()),
         }
     }
 
@@ -362,7 +368,7 @@ impl ControlThread {
         let (now, seen) = (self.clock.now(), self.seen());
         let state = |seen: &Seen| {
             let Snapshot { mode, state, phase, run, .. } = seen.snapshot;
-            (mode, state, phase, run, seen.calibrating)
+            (mode, state, phase, run, seen.calibrating, seen.lens_moving)
         };
         let changed = state(&seen) != state(&published.1);
         if changed || now.since(published.0) >= PUBLISH {

@@ -84,6 +84,7 @@ impl LensThread {
                 Received::Order(order) => {
                     attentive_until = self.clock.now() + ATTENTION;
                     self.obey(order, &mut state);
+                    self.orders.done(self.clock.now());
                 }
                 Received::Nothing => {
                     next_poll = self.clock.now() + self.look(&mut state, &mut attentive_until);

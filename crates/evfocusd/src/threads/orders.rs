@@ -3,15 +3,23 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use evfocus_core::HostMicros;
 use evfocus_core::controller::Action;
 
 /// What the lens is to do next. A slot rather than a queue: a motion that has been replaced need not be begun, so there is
 /// always room, however many callers move the lens at once.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Slot {
     stop: bool,
     motion: Option<Action>,
     closed: bool,
+    obeyed: HostMicros,
+}
+
+impl Default for Slot {
+    fn default() -> Self {
+        Self { stop: false, motion: None, closed: false, obeyed: HostMicros(i64::MIN) }
+    }
 }
 
 #[derive(Debug, Default)]
@@ -58,10 +66,18 @@ impl OrderSender {
         let mut slot = self.0.slot();
         match action {
             Action::StopLens => (slot.stop, slot.motion) = (true, None),
-            Action::Home | Action::MoveLens { .. } => slot.motion = Some(action),
+            Action::Home | Action::MoveLens { .. } => {
+                (slot.motion, slot.obeyed) = (Some(action), HostMicros(i64::MAX));
+            }
             Action::RunEnded => return,
         }
         self.0.filled.notify_one();
+    }
+
+    /// When the last motion was begun; the end of time if it has not been. What the lens answered to an earlier question does
+    /// not show that motion.
+    pub(crate) fn obeyed(&self) -> HostMicros {
+        self.0.slot().obeyed
     }
 }
 
@@ -86,6 +102,14 @@ impl OrderReceiver {
             Received::End
         } else {
             Received::Nothing
+        }
+    }
+
+    /// Everything received was done, or failed, by `now`.
+    pub(crate) fn done(&self, now: HostMicros) {
+        let mut slot = self.0.slot();
+        if slot.motion.is_none() {
+            slot.obeyed = now;
         }
     }
 }
@@ -125,6 +149,25 @@ mod tests {
         sender.send(to(2.0));
         sender.send(to(3.0));
         assert_eq!(all(&receiver), [Received::Order(Action::StopLens), Received::Order(to(3.0))]);
+    }
+
+    #[test]
+    fn a_motion_counts_as_begun_when_it_and_every_later_one_was_done() {
+        let (sender, receiver) = orders();
+        sender.send(to(1.0));
+        assert_eq!(sender.obeyed(), HostMicros(i64::MAX));
+        assert_eq!(receiver.receive(Duration::ZERO), Received::Order(to(1.0)));
+        sender.send(to(2.0));
+        receiver.done(HostMicros(10));
+        assert_eq!(sender.obeyed(), HostMicros(i64::MAX), "the second waits still");
+        assert_eq!(receiver.receive(Duration::ZERO), Received::Order(to(2.0)));
+        receiver.done(HostMicros(20));
+        assert_eq!(sender.obeyed(), HostMicros(20));
+        sender.send(to(3.0));
+        sender.send(Action::StopLens);
+        assert_eq!(all(&receiver), [Received::Order(Action::StopLens)]);
+        receiver.done(HostMicros(30));
+        assert_eq!(sender.obeyed(), HostMicros(30), "the stop took the third back");
     }
 
     #[test]
