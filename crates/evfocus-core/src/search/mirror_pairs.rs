@@ -33,16 +33,17 @@ const NEAR: f64 = 8.0;
 /// Fewer votes in the mode, in a bin times its width, than this prove nothing.
 const FEWEST_VOTES: f64 = 5.0;
 
-/// Where a pixel's levels were last reached.
+/// Where a pixel's levels were last reached, by OFF and by ON. In one line of the cache, for a pixel is seldom in it: it is what an
+/// event costs here.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 struct Pixel {
     level: i8,
-    by_off: [u16; LEVELS_IN_ALL],
-    by_on: [u16; LEVELS_IN_ALL],
+    reached: [[u16; 2]; LEVELS_IN_ALL],
 }
 
 impl Pixel {
-    const UNTOUCHED: Self = Self { level: 0, by_off: [NEVER; LEVELS_IN_ALL], by_on: [NEVER; LEVELS_IN_ALL] };
+    const UNTOUCHED: Self = Self { level: 0, reached: [[NEVER; 2]; LEVELS_IN_ALL] };
 
     /// Takes an event; the two places of the lens of the pair that it closes, if it does.
     fn take(&mut self, is_on: bool, step: TravelStep) -> Option<(u16, u16)> {
@@ -50,11 +51,10 @@ impl Pixel {
         let place = usize::try_from(i16::from(self.level) + i16::from(LEVELS))
             .ok()
             .filter(|&place| place < LEVELS_IN_ALL)?;
-        let (mine, other) =
-            if is_on { (&mut self.by_on, &mut self.by_off) } else { (&mut self.by_off, &mut self.by_on) };
-        let (reached, partner) = (mine.get_mut(place)?, other.get_mut(place)?);
-        *reached = step.0;
-        let before = core::mem::replace(partner, NEVER);
+        let reached = self.reached.get_mut(place)?;
+        let [off, on] = *reached;
+        let before = if is_on { off } else { on };
+        *reached = if is_on { [NEVER, step.0] } else { [step.0, NEVER] };
         (before != NEVER).then_some((before, step.0))
     }
 }

@@ -109,6 +109,7 @@ impl StructureKernel {
     }
 
     /// Takes an event that happened when the lens was at `step`.
+    #[inline]
     pub fn take(&mut self, event: &Event, step: TravelStep) {
         let Some(place) = self.place(event) else { return };
         let detail = detail(&self.state, self.stride, place);

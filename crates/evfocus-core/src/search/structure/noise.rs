@@ -64,6 +64,7 @@ impl NoiseMeter {
     }
 
     /// Takes an event; times must not decrease by more than jitter.
+    #[inline]
     pub fn take(&mut self, event: &Event) {
         let end = *self.span_end.get_or_insert(event.t.0 + SPAN_US);
         if event.t.0 >= end {

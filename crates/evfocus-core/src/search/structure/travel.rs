@@ -107,6 +107,7 @@ impl LensCursor {
     }
 
     /// Where the lens is at `time`; beyond the ends of the trace it stays where it was.
+    #[inline]
     pub(in crate::search) fn at(
         &mut self,
         time: CameraMicros,
