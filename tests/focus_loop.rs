@@ -138,6 +138,27 @@ fn the_faster_the_shorter_and_every_speed_is_right() -> Result<()> {
 }
 
 #[test]
+fn fast_goes_back_in_the_dark_until_the_delay_is_known() -> Result<()> {
+    let dark = config("[simulation]\nlight = \"dark\"\n[focus]\nspeed = \"fast\"")?;
+    let mut rig = VirtualRig::new(&dark)?;
+    let mut sweeps = Vec::new();
+    for _ in 0..2 {
+        let report = rig.focus(FocusRequest::default(), |_, _, _| {})?;
+        let answer = report.answer.context("an answer")?;
+        println!(
+            "{} sweeps: error {:+.1}, bar {:.1?}, confidence {:.2?}",
+            report.sweeps().count(),
+            error_of(&rig, &report)?,
+            answer.error_bar,
+            answer.confidence
+        );
+        sweeps.push(report.sweeps().count());
+    }
+    assert_eq!(sweeps, [2, 1]);
+    Ok(())
+}
+
+#[test]
 fn of_two_depths_the_one_asked_for_is_focused() -> Result<()> {
     let scene = "[simulation]\nscene = \"two-depths\"\nfocus_counts = 1500\nsecond_focus_counts = 2500\n";
     // Quicker runs end beyond the first depth that they are sure of.

@@ -27,6 +27,8 @@ impl fmt::Display for RunId {
 pub enum Directions {
     /// From the low end to the high end only.
     Forward,
+    /// Forward, and back too where that alone is not sure enough.
+    BackIfUnsure,
     /// There and back; the answer is the mean of both, each weighted by how sure it is, which cancels the lag.
     Both,
 }

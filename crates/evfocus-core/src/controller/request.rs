@@ -21,7 +21,8 @@ pub enum Mode {
 /// How thorough a run is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Pace {
-    /// One sweep, which ends one width beyond the peak; the delay of the pixels is taken off by what is known of it.
+    /// One sweep, which ends one width beyond the peak; the delay of the pixels is taken off by what is known of it. Where that is not
+    /// sure enough, as [`Normal`](Self::Normal).
     Fast,
     /// A sweep that ends beyond the peak, and the way back over it as the second one.
     #[default]
@@ -45,7 +46,7 @@ impl Pace {
 
     fn directions(self) -> Directions {
         match self {
-            Self::Fast => Directions::Forward,
+            Self::Fast => Directions::BackIfUnsure,
             Self::Normal | Self::Accurate => Directions::Both,
         }
     }

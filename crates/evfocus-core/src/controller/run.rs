@@ -22,6 +22,10 @@ const MOST_EXTENSIONS: u32 = 3;
 const LEAST_EXTENSION: f64 = 0.2;
 /// Delay for which the way back leaves room.
 const LONGEST_DELAY_S: f64 = 0.05;
+/// One way is enough for an answer of this confidence,
+const SURE: f64 = 0.9;
+/// on a rig whose delay was never measured only if its pixels have light: they make less noise than this, and what they have in common holds.
+const LEAST_NOISE_HZ: f64 = 0.02;
 
 /// What belongs to the run under way.
 #[derive(Debug)]
@@ -179,7 +183,7 @@ impl Controller {
         }
         let sweeps = match (run.plan.method, run.plan.directions) {
             // The others do not know what they do not know.
-            (Method::Structure | Method::Auto, Directions::Both) => 2,
+            (Method::Structure | Method::Auto, Directions::Both | Directions::BackIfUnsure) => 2,
             _ => 1,
         };
         let verdict = match verdict {
@@ -189,7 +193,24 @@ impl Controller {
         match (verdict, leg, run.plan.directions) {
             (Err(failure), _, _) => self.fail(failure, now, actions),
             (Ok(()), 0, Directions::Both) => self.turn_round(now, actions),
+            (Ok(()), 0, Directions::BackIfUnsure) if self.is_unsure() => self.turn_round(now, actions),
             (Ok(()), _, _) => self.decide(now, actions),
+        }
+    }
+
+    /// Whether the way back may tell what the first sweep does not. Where focus lies beyond the range it cannot.
+    fn is_unsure(&self) -> bool {
+        let Some(Run { plan, legs: [Some(first), _], delays, .. }) = &self.run else { return false };
+        let knows_the_delay = delays.measurements > 0
+            || first.structure.and_then(Result::ok).is_none_or(|said| said.noise_hz < LEAST_NOISE_HZ);
+        match (plan.method, self.judge()) {
+            (Method::Structure | Method::Auto, Ok(found)) => {
+                let is_sure =
+                    found.confidence.is_some_and(|confidence| confidence >= SURE) && knows_the_delay;
+                !is_sure && !found.flags.contains(Flag::Edge)
+            }
+            (Method::Structure | Method::Auto, Err(failure)) => !failure.is_final(2),
+            _ => false,
         }
     }
 

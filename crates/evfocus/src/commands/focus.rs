@@ -44,8 +44,8 @@ pub struct Arguments {
     /// Focus measure and search: auto, structure, mirror-pairs, egs, egs-official, er-fixed, er-squared
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
-    /// How thorough: fast (one sweep, which ends beyond the peak), normal (the same, and back over the peak) or accurate (the whole
-    /// range, both ways)
+    /// How thorough: fast (one sweep, which ends beyond the peak, if that is sure enough), normal (and back over the peak) or accurate
+    /// (the whole range, both ways)
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Pace::ALL.map(Pace::name)))]
     speed: Option<String>,
     /// A window of the picture to focus on, instead of the whole; up to eight times. Whole numbers are pixels, with a decimal point

@@ -19,7 +19,7 @@ pub struct FocusSection {
     pub method: Option<String>,
     /// Accumulation interval of `er-fixed`, milliseconds; 1 to 10,000, default 55.
     pub interval_ms: Option<f64>,
-    /// `fast`: one sweep that ends beyond the peak; `normal` (default): and back over the peak; `accurate`: the whole range, both ways.
+    /// `fast`: one sweep that ends beyond the peak, if that is sure enough; `normal` (default): and back over the peak; `accurate`: the whole range, both ways.
     pub speed: Option<String>,
     /// Which of several windows or depths counts: `strongest` (default) or `nearest`.
     pub prefer: Option<String>,

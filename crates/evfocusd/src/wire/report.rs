@@ -26,13 +26,12 @@ fn plan(plan: &FocusPlan, pace: Pace) -> ipc::FocusRequest {
         speed: Some(pace.name().to_owned()),
         speed_counts_per_s: Some(plan.speed.counts_per_second()),
         interval_us: u64::try_from(plan.interval.as_micros()).ok(),
-        directions: Some(
-            match plan.directions {
-                Directions::Forward => "forward",
-                Directions::Both => "both",
-            }
-            .to_owned(),
-        ),
+        directions: match plan.directions {
+            Directions::Forward => Some("forward".to_owned()),
+            Directions::Both => Some("both".to_owned()),
+            // It says so itself.
+            Directions::BackIfUnsure => None,
+        },
         windows: plan.windows.iter().flatten().map(pixels).collect(),
         prefer: Some(plan.prefer.to_string()),
     }
