@@ -74,10 +74,34 @@ pub(super) const PIXEL_MASK: u32 = 0x9100;
 /// The mask is in use.
 pub(super) const PIXEL_MASK_VALID: u32 = 1 << 31;
 
-/// The anti-flicker filter.
-pub(super) const AFK_CONTROL: u32 = 0xC000;
-/// It passes everything on.
-pub(super) const AFK_BYPASSED: u32 = 0b101;
+/// The anti-flicker filter, AFK.
+pub(crate) mod afk {
+    /// [`BYPASSED`] while it is set up.
+    pub(crate) const CONTROL: u32 = 0xC000;
+    /// It passes everything on.
+    pub(crate) const BYPASSED: u32 = 0b101;
+    /// It drops events that flicker.
+    pub(crate) const DROPPING: u32 = 0b001;
+    /// Bit 6: it drops all others instead.
+    pub(crate) const PARAM: u32 = 0xC004;
+    /// See [`PARAM`].
+    pub(crate) const INVERT: u32 = 1 << 6;
+    /// Bits 7 to 0: shortest period that is taken for flicker, bits 15 to 8: longest, both in 128 us; bits 19 to 16: 16 times the part of
+    /// the period that is dark.
+    pub(crate) const FILTER_PERIOD: u32 = 0xC008;
+    /// Half of the period.
+    pub(crate) const HALF_DARK: u32 = 8 << 16;
+    /// Bits 11 to 0: how long to wait before old periods are forgotten.
+    pub(crate) const INVALIDATION: u32 = 0xC0C0;
+    /// See [`INVALIDATION`].
+    pub(crate) const WAIT_TIME_MASK: u32 = 0xFFF;
+    /// What OpenEB waits.
+    pub(crate) const WAIT_TIME: u32 = 1630;
+    /// Bit 2: its memory is ready.
+    pub(crate) const INITIALIZATION: u32 = 0xC0C4;
+    /// See [`INITIALIZATION`].
+    pub(crate) const READY: u32 = 1 << 2;
+}
 /// The noise filters (trail, and contrast in space and time).
 pub(super) const STC_CONTROL: u32 = 0xD000;
 /// They pass everything on.

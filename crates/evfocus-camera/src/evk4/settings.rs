@@ -31,12 +31,17 @@ pub struct Settings {
     pub row_order: RowOrder,
     /// Events a second above which the sensor drops some. It falsifies the event rate exactly where the picture is sharp.
     pub rate_limit: Option<u32>,
+    /// Events that repeat at frequencies from the first to the second, Hz, are dropped: lamps on the mains, 100 or 120.
+    pub anti_flicker_hz: Option<(u16, u16)>,
     /// Put edges at the trigger input into the stream.
     pub trigger_input: bool,
 }
 
 /// Range of the rate limit: one event in a period of 200 us, and what OpenEB allows.
 pub(super) const RATE_LIMITS: (u32, u32) = (5_000, 3_200_000_000);
+
+/// Range of the anti-flicker filter's frequencies, Hz, in OpenEB.
+pub(super) const FLICKER_HZ: (u16, u16) = (50, 500);
 
 impl Settings {
     /// Checks every value.
@@ -55,6 +60,15 @@ impl Settings {
         }
         SettingsError::check_roi(self.roi, GEOMETRY)?;
         SettingsError::check_pixels(&self.masked_pixels, PIXEL_MASKS, GEOMETRY)?;
+        let (lowest, highest) = FLICKER_HZ;
+        if let Some((low, high)) = self.anti_flicker_hz
+            && !(lowest <= low && low <= high && high <= highest)
+        {
+            let what = format!(
+                "[{low}, {high}]; it must be a lower and a higher frequency from {lowest} to {highest} Hz"
+            );
+            return Err(SettingsError::new("anti_flicker_hz", what));
+        }
         let (min, max) = RATE_LIMITS;
         match self.rate_limit.filter(|limit| *limit < min || *limit > max) {
             Some(limit) => {

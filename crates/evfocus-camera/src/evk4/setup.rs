@@ -5,9 +5,9 @@ use evfocus_hal::DeviceError;
 use evfocus_hal::usb::{UsbError, UsbTransport};
 
 use super::registers::{
-    AFK_BYPASSED, AFK_CONTROL, BIAS_WORD, CHIP_ID, CHIP_ID_IMX636, CHIP_VARIANT, CHIP_VARIANT_MASK,
-    PIPELINE_CONTROL, PIPELINE_EVT21, PIXEL_MASK, PIXEL_MASK_VALID, ROI_COLUMNS, ROI_CTRL, ROI_ROWS,
-    STC_BYPASS, STC_CONTROL, TRIGGER_CONTROL, TRIGGER_ENABLE, erc, roi_ctrl,
+    BIAS_WORD, CHIP_ID, CHIP_ID_IMX636, CHIP_VARIANT, CHIP_VARIANT_MASK, PIPELINE_CONTROL, PIPELINE_EVT21,
+    PIXEL_MASK, PIXEL_MASK_VALID, ROI_COLUMNS, ROI_CTRL, ROI_ROWS, STC_BYPASS, STC_CONTROL, TRIGGER_CONTROL,
+    TRIGGER_ENABLE, afk, erc, roi_ctrl,
 };
 use super::sequences::{DESTROY, INIT, STOP};
 use super::settings::{RowOrder, Settings};
@@ -37,7 +37,7 @@ impl<T: UsbTransport> Evk4<T> {
         self.run(&DESTROY)?;
         self.run(&INIT)?;
         self.set_bits(PIPELINE_CONTROL, 0, PIPELINE_EVT21)?;
-        self.put(AFK_CONTROL, &[AFK_BYPASSED])?;
+        self.set_anti_flicker(settings.anti_flicker_hz)?;
         self.set_bits(STC_CONTROL, STC_BYPASS, STC_BYPASS)?;
         self.set_rate_control(settings.rate_limit)?;
         let trigger = if settings.trigger_input { TRIGGER_ENABLE } else { 0 };
@@ -64,6 +64,22 @@ impl<T: UsbTransport> Evk4<T> {
             }
         }
         Ok(())
+    }
+
+    /// The anti-flicker filter, in OpenEB's order; `None`: it passes everything on.
+    fn set_anti_flicker(&mut self, frequencies_hz: Option<(u16, u16)>) -> Result<(), DeviceError> {
+        self.put(afk::CONTROL, &[afk::BYPASSED])?;
+        let Some((low, high)) = frequencies_hz else { return Ok(()) };
+        if self.get(afk::INITIALIZATION)? & afk::READY == 0 {
+            let what = "its anti-flicker filter does not get ready; leave anti_flicker_hz out";
+            return Err(self.protocol_error(what.to_owned()));
+        }
+        self.set_bits(afk::INVALIDATION, afk::WAIT_TIME, afk::WAIT_TIME_MASK)?;
+        // 50 Hz, the lowest, just fits into 8 bits.
+        let period = |hz: u16| (1_000_000 / u32::from(hz)) >> 7;
+        self.put(afk::FILTER_PERIOD, &[afk::HALF_DARK | period(low) << 8 | period(high)])?;
+        self.set_bits(afk::PARAM, 0, afk::INVERT)?;
+        self.put(afk::CONTROL, &[afk::DROPPING])
     }
 
     /// The event-rate controller, in OpenEB's order. Without a limit it counts, and drops nothing.

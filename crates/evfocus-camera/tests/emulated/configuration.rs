@@ -119,6 +119,7 @@ fn settings_reach_the_evk4() {
         biases: vec![("bias_diff_on".to_owned(), 20), ("bias_hpf".to_owned(), 255)],
         masked_pixels: vec![(3, 200)],
         rate_limit: Some(1_000_000),
+        anti_flicker_hz: Some((100, 120)),
         trigger_input: true,
         row_order: RowOrder::BottomUp,
         ..evk4::Settings::default()
@@ -128,6 +129,8 @@ fn settings_reach_the_evk4() {
     assert_eq!((register(0x1010), register(0x100C)), (0x11A1_007A, 0x11A1_00FF));
     assert_eq!((register(0x9100), register(0x9104)), (1 << 31 | 519 << 16 | 3, 0));
     assert_eq!((register(0x6008), register(0x600C), register(0x6050)), (200, 200, 1));
+    // 8.3 and 10 ms in units of 128 us, half of it dark, and 1630 to wait.
+    assert_eq!((register(0xC000), register(0xC008), register(0xC0C0) & 0xFFF), (1, 0x8_4E41, 0x65E));
     assert_eq!(register(0x7004) >> 10 & 1, 1);
     // Switched off when it is let go: the output stays disabled.
     drop(camera);
@@ -172,6 +175,11 @@ fn what_a_camera_does_not_have_is_refused_before_it_is_touched() {
     let biases = vec![("bias_fo".to_owned(), -151)];
     let error = bench.open_evk4(&evk4::Settings { biases, ..evk4::Settings::default() }).err().unwrap();
     assert!(error.to_string().contains("from -150 to 200, not -151"), "{error}");
+    for band in [(49, 120), (120, 100), (100, 501)] {
+        let settings = evk4::Settings { anti_flicker_hz: Some(band), ..evk4::Settings::default() };
+        let error = bench.open_evk4(&settings).err().unwrap();
+        assert!(error.to_string().contains(&format!("anti_flicker_hz: [{}, {}]", band.0, band.1)), "{error}");
+    }
     let settings = evk4::Settings { rate_limit: Some(10), ..evk4::Settings::default() };
     let error = bench.open_evk4(&settings).err().unwrap();
     assert!(error.to_string().contains("rate_limit: 10 events/s"), "{error}");

@@ -45,6 +45,8 @@ pub struct CameraSection {
     pub packet_delay_ms: Option<f64>,
     /// Events a second above which an EVK4 drops some; absent: never.
     pub rate_limit_events_per_s: Option<u32>,
+    /// Lowest and highest frequency, Hz, at which an EVK4 drops what flickers; 50 to 500; absent: nothing.
+    pub anti_flicker_hz: Option<[u16; 2]>,
     /// Signals put into the stream: `off`; of a DAVIS346 `rising`, `falling` or `pulse`; of an EVK4 `edges`.
     pub trigger_input: Option<String>,
 }
@@ -76,6 +78,7 @@ impl Default for CameraSection {
             refractory_filter_ms: None,
             packet_delay_ms: None,
             rate_limit_events_per_s: None,
+            anti_flicker_hz: None,
             trigger_input: None,
         }
     }
@@ -218,6 +221,7 @@ impl CameraSection {
         let evk4 = [
             ("row_order", self.row_order.is_some()),
             ("rate_limit_events_per_s", self.rate_limit_events_per_s.is_some()),
+            ("anti_flicker_hz", self.anti_flicker_hz.is_some()),
         ];
         let replay = [
             ("file", self.file.is_some()),
@@ -309,6 +313,7 @@ impl CameraSection {
             masked_pixels: self.pixels(),
             row_order: choice("camera.row_order", self.row_order.as_ref(), &orders)?,
             rate_limit: self.rate_limit_events_per_s,
+            anti_flicker_hz: self.anti_flicker_hz.map(|[low, high]| (low, high)),
             trigger_input: choice("camera.trigger_input", self.trigger_input.as_ref(), &triggers)?,
         };
         settings.check().map_err(|error| bad_setting(&error))?;
