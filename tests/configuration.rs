@@ -68,7 +68,7 @@ fn the_cameras_files_are_annotated_with_what_is_used_without_them() {
     let biases = std::mem::take(&mut settings.biases);
     assert_eq!(settings, evfocus_camera::davis346::Settings::default());
     assert_eq!(biases.len(), 6);
-    let left_out = ["serial", "masked_pixels", "rate_limit_events_per_s"];
+    let left_out = ["serial", "masked_pixels", "rate_limit_events_per_s", "anti_flicker_hz"];
     let CameraConfig::Evk4 { mut settings, .. } = written("evk4.toml", &left_out) else { panic!() };
     assert_eq!(settings.roi.take(), whole(evfocus_camera::evk4::GEOMETRY));
     let biases = std::mem::take(&mut settings.biases);
