@@ -197,6 +197,22 @@ fn structure_does_not_mind_events_that_have_nothing_to_do_with_the_picture() -> 
     Ok(())
 }
 
+/// A star, a specimen: all that there is to see lies in a small part of the picture.
+#[test]
+fn one_small_object_is_enough() -> anyhow::Result<()> {
+    let sweep = RecordedSweep::read(&committed(), "light_static")?;
+    for (x, y) in [(120, 70), (180, 140)] {
+        let within = |event: &&Event| (x..x + 50).contains(&event.x) && (y..y + 50).contains(&event.y);
+        let events: Vec<Event> = sweep.events.iter().filter(within).copied().collect();
+        let answer =
+            judged(&sweep, &with_events(&sweep, &events))?.map_err(|failure| anyhow::anyhow!("{failure}"))?;
+        let (error, bar) = (answer.position.counts_from(sweep.truth), answer.error_bar.unwrap_or(f64::NAN));
+        println!("{} events around {x}, {y}: {error:+.1} ± {bar:.1}", events.len());
+        assert!(error.abs() < 2.0 * bar && bar < 20.0, "{answer:?}");
+    }
+    Ok(())
+}
+
 /// Without the rule for turning points a pixel lags: its events after a turn come a threshold or two late.
 #[test]
 fn structure_without_its_rule_for_turning_points_lags() -> anyhow::Result<()> {

@@ -61,7 +61,7 @@ impl StructureMeasure {
         // What belongs to the other depth says nothing about this one.
         let own = Reading { tiles: TileSet::ALL.without(rival_tiles.unwrap_or(TileSet::NONE)), ..usual };
         let apex = if rival.is_some() { self.read(own)? } else { apex };
-        let scatter = self.scatter(own, apex);
+        let scatter = self.scatter(own, apex, &tiles);
         Some(Found { apex, filter, scatter, rival, tiles })
     }
 
@@ -75,7 +75,7 @@ impl StructureMeasure {
 
     /// One standard deviation of `apex`, in bins: how far other readings of the same events lie from it, how much single tiles move it,
     /// and what neither shows.
-    fn scatter(&mut self, usual: Reading, apex: Apex) -> f64 {
+    fn scatter(&mut self, usual: Reading, apex: Apex, tiles: &[Apex; Bookings::TILES]) -> f64 {
         let other_filter = if usual.filter == Filter::Coarse { Filter::Fine } else { Filter::Coarse };
         let others = [
             Reading { filter: other_filter, ..usual },
@@ -99,15 +99,19 @@ impl StructureMeasure {
         }
         let readings = squares / number.max(1.0);
         let unseen = UNSEEN_SCATTER * apex.width;
-        libm::sqrt(readings + self.jackknife(usual) + unseen * unseen)
+        libm::sqrt(readings + self.jackknife(usual, tiles) + unseen * unseen)
     }
 
-    /// The variance of the apex, estimated by leaving out one tile after the other.
-    fn jackknife(&mut self, usual: Reading) -> f64 {
+    /// The variance of the apex, estimated by leaving out one tile after the other; `tiles` is what each says alone.
+    fn jackknife(&mut self, usual: Reading, tiles: &[Apex; Bookings::TILES]) -> f64 {
         let (mut sum, mut squares, mut number) = (0.0, 0.0, 0.0);
-        for tile in (0..Bookings::TILES).filter(|&tile| usual.tiles.contains(tile)) {
+        for (tile, alone) in tiles.iter().enumerate().filter(|&(tile, _)| usual.tiles.contains(tile)) {
             let tiles = usual.tiles.without(TileSet::only(tile));
-            if let Some(apex) = self.read(Reading { tiles, ..usual }) {
+            // Where all that there is to see lies in one tile, chance is what is left without it.
+            let is_all = |apex: &Apex| {
+                alone.significance >= LEAST_SIGNIFICANCE && apex.significance < LEAST_TILE_SIGNIFICANCE
+            };
+            if let Some(apex) = self.read(Reading { tiles, ..usual }).filter(|apex| !is_all(apex)) {
                 sum += apex.at;
                 squares += apex.at * apex.at;
                 number += 1.0;
