@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use evfocus_core::LensPosition;
 
+use crate::changes::{Change, ChangeKind};
 use crate::fan::FanConfig;
 use crate::faults::{Fault, FaultKind, FaultTrigger};
 use crate::lens::LensConfig;
@@ -37,6 +38,8 @@ pub struct RigConfig {
     pub link: LinkConfig,
     /// What goes wrong.
     pub faults: Vec<Fault>,
+    /// What happens in front of the camera, in order of time.
+    pub changes: Vec<Change>,
     /// Every random choice follows from it. Default 1.
     pub seed: u64,
 }
@@ -71,6 +74,13 @@ impl RigConfig {
             ConfigError::check("flicker.hertz", flicker.hertz, 0.1, 500.0)?;
             ConfigError::check("flicker.depth", flicker.depth, 0.0, 1.0)?;
         }
+        for change in &self.changes {
+            match change.kind {
+                ChangeKind::Focus { by } => ConfigError::check("changes.by", by, -1e5, 1e5)?,
+                ChangeKind::Pace { times } => ConfigError::check("changes.times", times, 0.0, 100.0)?,
+                ChangeKind::Light { times } => ConfigError::check("changes.times", times, 1e-3, 1e3)?,
+            }
+        }
         for fault in &self.faults {
             if let FaultKind::EventLoss { share, .. } = fault.kind {
                 ConfigError::check("faults.share", share, 0.0, 1.0)?;
@@ -97,6 +107,7 @@ impl Default for RigConfig {
             lens: LensConfig::default(),
             link: LinkConfig::default(),
             faults: Vec::new(),
+            changes: Vec::new(),
             seed: 1,
         }
     }

@@ -11,6 +11,7 @@
 //! ([`Rig::truth`]) never passes through the traits.
 
 mod camera;
+mod changes;
 mod config;
 mod fan;
 mod faults;
@@ -28,6 +29,7 @@ mod usb;
 pub mod wire;
 
 pub use camera::SimCamera;
+pub use changes::{Change, ChangeKind};
 pub use config::{ConfigError, Flicker, LinkConfig, RigConfig};
 pub use fan::FanConfig;
 pub use faults::{Fault, FaultKind, FaultTrigger};

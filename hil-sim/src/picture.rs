@@ -4,6 +4,7 @@ mod rows;
 
 use std::sync::OnceLock;
 
+use crate::changes::Scenery;
 use crate::config::RigConfig;
 use crate::fan::{Fan, Place};
 use crate::motion::{Motion, Pose};
@@ -114,7 +115,8 @@ impl Picture {
         let middle = f64::midpoint(range.min().0, range.max().0);
         let optics = &self.config.optics;
         let Content { planes, fan, canvas } = self.content();
-        let pose = self.motion.pose(seconds);
+        let scenery = Scenery::at(&self.config.changes, seconds);
+        let pose = self.motion.pose(scenery.motion_seconds);
         let (strip, canvas_width) = (self.strip(), canvas.0 as f64);
         let mut blends = Vec::new();
         for (stack, focus) in planes {
@@ -122,19 +124,19 @@ impl Picture {
                 // The tilt stays with the sensor while the scene moves: it is that of the place where the strip is seen.
                 let column = (index * strip) as f64 + 0.5 * (strip as f64) + pose.right;
                 let right = column.rem_euclid(canvas_width) - 0.5 * canvas_width;
-                stack.blend(optics.radius(position - focus - self.tilt(right)))
+                stack.blend(optics.radius(position - focus - scenery.focus - self.tilt(right)))
             }));
         }
         let fan = fan.as_ref().zip(self.config.fan).map(|((fan, focus), config)| {
             let tilt = self.tilt((config.middle.0 - 0.5) * self.width as f64);
-            (fan.blend(optics.radius(position - focus - tilt)), config.angle(seconds))
+            (fan.blend(optics.radius(position - focus - scenery.focus - tilt)), config.angle(seconds))
         });
         View {
             blends,
             fan,
             pose,
             scale: 1.0 + optics.breathing * (position - middle) / range.length(),
-            gain: self.config.flicker.map_or(1.0, |flicker| flicker.gain(seconds)) as f32,
+            gain: (scenery.light * self.config.flicker.map_or(1.0, |flicker| flicker.gain(seconds))) as f32,
         }
     }
 

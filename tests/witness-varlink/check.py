@@ -14,6 +14,8 @@ METHODS = [
     "MoveTo",
     "Calibrate",
     "SetMode",
+    "Pause",
+    "Resume",
     "Monitor",
     "GetReport",
     "ListDevices",
@@ -64,6 +66,8 @@ def calls(connection):
     check("Abort without a run", connection.Abort().get("run_id") is None)
     connection.SetMode(mode="auto")
     check("SetMode", True)
+    refused(lambda: connection.Pause(when="deferred"), f"{INTERFACE}.WrongMode")
+    refused(connection.Resume, f"{INTERFACE}.WrongMode")
 
 
 def refusals(connection, limits):

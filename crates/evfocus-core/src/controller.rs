@@ -13,20 +13,25 @@
 //!                                                               ^                          | arrived
 //!                                                               +------- off target --- Verifying ----> Idle, Focused
 //!
+//!  Idle, mode continuous --- focus unknown, or lost for long enough ---> as if Focus had been called
 //!  any state of a run --- failure --> Restoring -> Idle, Failed      (lens or camera gone: lens stopped, Idle, Failed at once)
 //!  any state ------------ Abort ----> lens stopped, Idle
 //! ```
 
 mod config;
+mod continuous;
 mod interface;
 mod motion;
 mod request;
 mod run;
 mod sweeping;
+mod watcher;
 
 pub use config::{ControllerConfig, OnFailure};
+pub use continuous::{Pause, PauseState};
 pub use interface::{Action, DeviceFailure, FocusState, Input, Snapshot};
 pub use request::{Accepted, Command, FocusRequest, Mode, Pace, Refusal, check_windows};
+pub use watcher::WatchConfig;
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -38,6 +43,7 @@ use crate::lens_trace::LensSample;
 use crate::report::{Failure, Outcome, Phase, RunId, RunReport};
 use crate::units::{EventRate, HostMicros, LensPosition};
 
+use continuous::Continuous;
 use motion::{Motion, Progress};
 use run::Run;
 use sweeping::SweepState;
@@ -85,6 +91,7 @@ pub struct Controller {
     lens_ready: bool,
     events: u64,
     lost: u64,
+    continuous: Continuous,
     rate_window: (HostMicros, u64),
     event_rate: EventRate,
 }
@@ -111,6 +118,7 @@ impl Controller {
             lens_ready: true,
             events: 0,
             lost: 0,
+            continuous: Continuous::new(&config, geometry, now),
             rate_window: (now, 0),
             event_rate: EventRate(0.0),
             config,
@@ -129,6 +137,7 @@ impl Controller {
             return false;
         }
         self.sweep = SweepState::new(self.geometry, &config);
+        self.continuous.watcher.configure(config.watch);
         self.config = config;
         true
     }
@@ -168,6 +177,9 @@ impl Controller {
         let scanning = self.run.is_some();
         Snapshot {
             mode: self.mode,
+            pause: self.continuous.pause,
+            sharpness: self.sharpness(),
+            continuous_runs: self.continuous.runs,
             state: if scanning { FocusState::Scanning } else { self.outcome },
             phase: self.phase(),
             run: self.run.as_ref().map(|run| run.id),
@@ -209,16 +221,23 @@ impl Controller {
             Command::Focus(request) => self.focus(request, now, actions),
             Command::Abort => {
                 self.abort(now, actions);
+                // Or it would move again at once.
+                self.continuous.pause = PauseState::Paused;
                 Ok(Accepted::Done)
             }
+            Command::Pause(pause) => self.pause(pause, now, actions).map(|()| Accepted::Done),
             Command::MoveTo(target) => self.move_to(target, now, actions),
             Command::SetMode(mode) => {
                 if mode != self.mode {
                     if self.state != State::Idle {
                         self.abort(now, actions);
                     }
+                    let keeps_focus = mode == Mode::Continuous && self.outcome == FocusState::Focused;
                     self.mode = mode;
-                    self.outcome = FocusState::Idle;
+                    self.enter_continuous(now);
+                    if !keeps_focus {
+                        self.outcome = FocusState::Idle;
+                    }
                 }
                 Ok(Accepted::Done)
             }
@@ -239,6 +258,18 @@ impl Controller {
             let same = run.plan == plan || request == FocusRequest::default();
             return if same { Ok(Accepted::UnderWay(run.id)) } else { Err(Refusal::Busy { run: run.id }) };
         }
+        let run = self.start(request, now, actions)?;
+        self.continuous.request = request;
+        Ok(Accepted::Started(run))
+    }
+
+    fn start(
+        &mut self,
+        request: FocusRequest,
+        now: HostMicros,
+        actions: &mut Vec<Action>,
+    ) -> Result<RunId, Refusal> {
+        let plan = request.resolve(&self.config, self.geometry)?;
         if !self.camera_ready {
             return Err(Refusal::NoCamera);
         }
@@ -258,7 +289,7 @@ impl Controller {
             actions.push(Action::Home);
             self.enter(State::Homing { since: now, seen_moving: false }, now);
         }
-        Ok(Accepted::Started(id))
+        Ok(id)
     }
 
     fn move_to(
@@ -322,6 +353,8 @@ impl Controller {
                 self.camera_heard = now;
                 // It may count from zero again.
                 self.clock = ClockMap::new(None);
+                self.continuous.watcher.interrupt();
+                self.continuous.watcher.device_is_back(now);
             }
             Input::LensFailed(failure) => {
                 self.lens_ready = false;
@@ -340,6 +373,7 @@ impl Controller {
             Input::LensReady => {
                 self.lens_ready = true;
                 self.lens_heard = now;
+                self.continuous.watcher.device_is_back(now);
             }
             Input::Tick => self.watch_time(now, actions),
         }
@@ -363,8 +397,8 @@ impl Controller {
                     self.sweep.extend_live_curve(reached);
                 }
             }
-            State::Idle
-            | State::Moving(_)
+            State::Idle => self.watch_events(&batch.events, now),
+            State::Moving(_)
             | State::Homing { .. }
             | State::ToStart(_)
             | State::Approaching { .. }
@@ -453,6 +487,7 @@ impl Controller {
             self.rate_window = (now, self.events);
         }
         if self.state == State::Idle {
+            self.watch_focus(now, actions);
             return;
         }
         if now.since(self.lens_heard) >= self.config.silence_timeout {

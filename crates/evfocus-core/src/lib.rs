@@ -27,6 +27,7 @@ mod measure;
 mod quality;
 mod report;
 pub mod search;
+mod sharpness;
 mod sweep;
 mod units;
 
@@ -52,6 +53,7 @@ pub use report::{
     Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport, Suspicion, Windows,
 };
 pub use search::{Estimate, Method, SearchError, Searcher};
+pub use sharpness::SharpnessMeter;
 pub use sweep::{HOLD, Sweep, SweepCapacity, SweepRecorder};
 pub use units::{
     CameraMicros, EventRate, HostMicros, LensPosition, LensRange, LensSpeed, Timestamp, UnitError,

@@ -19,7 +19,9 @@ pub use results::Reloaded;
 
 use crate::frame::{FrameReader, encode};
 use crate::message::{Call, Incoming};
-use crate::{Calibration, Device, FocusRequest, INTERFACE, Mode, Progress, Report, Request, Status};
+use crate::{
+    Calibration, Device, FocusRequest, INTERFACE, Mode, PauseWhen, Progress, Report, Request, Status,
+};
 
 /// The longest reply taken, in bytes: far above any report, far below any memory.
 const REPLY_BYTES: usize = 64 * 1024 * 1024;
@@ -88,6 +90,16 @@ impl Client {
     /// Changes the mode.
     pub async fn set_mode(&mut self, mode: Mode) -> Result<(), ClientError> {
         self.call::<results::Nothing>(&Request::SetMode { mode }).await.map(drop)
+    }
+
+    /// Pauses continuous mode.
+    pub async fn pause(&mut self, when: PauseWhen) -> Result<(), ClientError> {
+        self.call::<results::Nothing>(&Request::Pause { when: Some(when) }).await.map(drop)
+    }
+
+    /// Goes on with continuous mode.
+    pub async fn resume(&mut self) -> Result<(), ClientError> {
+        self.call::<results::Nothing>(&Request::Resume).await.map(drop)
     }
 
     /// Follows the status: now, whenever it changes, and once a second if it does not. A change of the lens's position or of

@@ -32,7 +32,7 @@ pub use focus::{CurvePoint, FocusRequest, FocusWindow, LensRange, Progress, Wind
 pub use parts::{FocusMap, WindowAnswer};
 pub use report::{ClockMap, EventCounts, Outcome, PhaseTiming, REPORT_FORMAT, Report, RigDelay, RunDevices};
 pub use request::{Reply, Request};
-pub use status::{Grant, LastRun, Mode, Phase, State, Status};
+pub use status::{Grant, LastRun, Mode, PauseState, PauseWhen, Phase, State, Status};
 pub use sweep::{Curve, Direction, Estimate, Quality, Structure, Sweep};
 
 /// The name of the interface.

@@ -7,7 +7,8 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use crate::{
-    Calibration, Device, Error, FocusRequest, FocusWindow, LensRange, Mode, Progress, Report, Status,
+    Calibration, Device, Error, FocusRequest, FocusWindow, LensRange, Mode, PauseWhen, Progress, Report,
+    Status,
 };
 
 /// Longest part of a wrong argument that is quoted back, in characters.
@@ -34,6 +35,13 @@ pub enum Request {
         /// The new mode.
         mode: Mode,
     },
+    /// Pause continuous mode.
+    Pause {
+        /// At once if absent.
+        when: Option<PauseWhen>,
+    },
+    /// Go on with continuous mode.
+    Resume,
     /// Follow the status.
     Monitor,
     /// Read a report.
@@ -97,13 +105,15 @@ pub enum Reply {
 
 impl Request {
     /// The names of the interface's methods.
-    pub const NAMES: [&str; 10] = [
+    pub const NAMES: [&str; 12] = [
         "GetStatus",
         "Focus",
         "Abort",
         "MoveTo",
         "Calibrate",
         "SetMode",
+        "Pause",
+        "Resume",
         "Monitor",
         "GetReport",
         "ListDevices",
@@ -120,6 +130,8 @@ impl Request {
             "MoveTo" => arguments.take("position").map(|position| Self::MoveTo { position }),
             "Calibrate" => Ok(Self::Calibrate),
             "SetMode" => arguments.take("mode").map(|mode| Self::SetMode { mode }),
+            "Pause" => arguments.take("when").map(|when| Self::Pause { when }),
+            "Resume" => Ok(Self::Resume),
             "Monitor" => Ok(Self::Monitor),
             "GetReport" => arguments.take("id").map(|id| Self::GetReport { id }),
             "ListDevices" => arguments.take("probe").map(|probe| Self::ListDevices { probe }),
@@ -138,6 +150,8 @@ impl Request {
             Self::MoveTo { .. } => "MoveTo",
             Self::Calibrate => "Calibrate",
             Self::SetMode { .. } => "SetMode",
+            Self::Pause { .. } => "Pause",
+            Self::Resume => "Resume",
             Self::Monitor => "Monitor",
             Self::GetReport { .. } => "GetReport",
             Self::ListDevices { .. } => "ListDevices",
@@ -153,6 +167,8 @@ impl Request {
             | Self::MoveTo { .. }
             | Self::Calibrate
             | Self::SetMode { .. }
+            | Self::Pause { .. }
+            | Self::Resume
             | Self::Reload
             // Asking a port resets what is on it.
             | Self::ListDevices { probe: Some(_) } => true,
@@ -163,12 +179,13 @@ impl Request {
     /// The method's arguments.
     pub(crate) fn parameters(&self) -> Result<Map<String, Value>, serde_json::Error> {
         let value = match self {
-            Self::GetStatus | Self::Abort | Self::Calibrate | Self::Monitor | Self::Reload => {
+            Self::GetStatus | Self::Abort | Self::Calibrate | Self::Resume | Self::Monitor | Self::Reload => {
                 return Ok(Map::new());
             }
             Self::Focus(request) => serde_json::to_value(request)?,
             Self::MoveTo { position } => serde_json::json!({ "position": position }),
             Self::SetMode { mode } => serde_json::json!({ "mode": mode }),
+            Self::Pause { when } => serde_json::json!({ "when": when }),
             Self::GetReport { id } => serde_json::json!({ "id": id }),
             Self::ListDevices { probe } => serde_json::json!({ "probe": probe }),
         };
@@ -241,6 +258,10 @@ mod tests {
             Request::MoveTo { position: 1234.5 },
             Request::Calibrate,
             Request::SetMode { mode: Mode::Manual },
+            Request::SetMode { mode: Mode::Continuous },
+            Request::Pause { when: None },
+            Request::Pause { when: Some(PauseWhen::Deferred) },
+            Request::Resume,
             Request::Monitor,
             Request::GetReport { id: Some(7) },
             Request::GetReport { id: None },
@@ -258,7 +279,8 @@ mod tests {
             ("MoveTo", r#"{"position": "far"}"#, "position"),
             ("MoveTo", "{}", "position"),
             ("MoveTo", r#"{"position": 3, "speeed": 4}"#, "speeed"),
-            ("SetMode", r#"{"mode": "continuous"}"#, "mode"),
+            ("SetMode", r#"{"mode": "continual"}"#, "mode"),
+            ("Pause", r#"{"when": "soon"}"#, "when"),
             ("Focus", r#"{"range": {"min": 1}}"#, "range"),
             ("Focus", r#"{"range": {"min": 1, "max": 2, "step": 3}}"#, "range"),
             ("Focus", r#"{"interval_us": -1}"#, "interval_us"),

@@ -15,6 +15,32 @@ pub enum Mode {
     /// The lens moves by itself, but only when a focus run is started.
     #[default]
     Auto,
+    /// The lens moves by itself, when a focus run is started, when focus is not known, and when the picture has lost its sharpness.
+    Continuous,
+}
+
+/// Whether continuous mode may start runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PauseState {
+    /// It may.
+    #[default]
+    Running,
+    /// The run under way is the last one.
+    Pausing,
+    /// It may not.
+    Paused,
+}
+
+/// When continuous mode is to pause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PauseWhen {
+    /// At once; a run under way is aborted.
+    #[default]
+    Immediate,
+    /// A run under way comes to its end first.
+    Deferred,
 }
 
 /// How the last focus run went, or that one is under way.
@@ -67,6 +93,18 @@ impl Mode {
         match self {
             Self::Manual => "manual",
             Self::Auto => "auto",
+            Self::Continuous => "continuous",
+        }
+    }
+}
+
+impl PauseState {
+    /// The name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Running => "running",
+            Self::Pausing => "pausing",
+            Self::Paused => "paused",
         }
     }
 }
@@ -125,6 +163,12 @@ impl fmt::Display for Phase {
 pub struct Status {
     /// Who decides about the lens.
     pub mode: Mode,
+    /// Whether continuous mode may start runs; [`PauseState::Running`] in other modes says nothing.
+    #[serde(default)]
+    pub pause: PauseState,
+    /// How sharp the picture is as a share of what it was in focus; nothing unless continuous mode knows.
+    #[serde(default)]
+    pub sharpness: Option<f64>,
     /// How focusing stands.
     pub state: State,
     /// What the run under way is at; [`Phase::None`] without one.

@@ -4,7 +4,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
     abort, analyze, calibrate, completions, demo, devices, doctor, eval, focus, info, man, measure, mode,
-    move_lens, record, reload, replay, report, simulate, status, watch,
+    move_lens, pause, record, reload, replay, report, simulate, status, watch,
 };
 use crate::exit::Exit;
 
@@ -36,6 +36,8 @@ enum Command {
     Watch(watch::Arguments),
     Move(move_lens::Arguments),
     Mode(mode::Arguments),
+    Pause(pause::Arguments),
+    Resume(pause::ResumeArguments),
     Calibrate(calibrate::Arguments),
     Devices(devices::Arguments),
     Doctor(doctor::Arguments),
@@ -64,6 +66,8 @@ impl Cli {
             Command::Watch(arguments) => watch::run(&arguments),
             Command::Move(arguments) => move_lens::run(&arguments),
             Command::Mode(arguments) => mode::run(&arguments),
+            Command::Pause(arguments) => pause::run(&arguments),
+            Command::Resume(arguments) => pause::resume(&arguments),
             Command::Calibrate(arguments) => calibrate::run(&arguments),
             Command::Devices(arguments) => devices::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),

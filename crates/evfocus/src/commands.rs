@@ -14,6 +14,7 @@ pub mod man;
 pub mod measure;
 pub mod mode;
 pub mod move_lens;
+pub mod pause;
 pub mod record;
 pub mod reload;
 pub mod replay;

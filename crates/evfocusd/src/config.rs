@@ -2,6 +2,7 @@
 
 mod access;
 mod camera;
+mod continuous;
 mod focus;
 mod lens;
 mod metrics;
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use evfocus_core::LensPosition;
-use evfocus_core::controller::{FocusRequest, Mode, Refusal};
+use evfocus_core::controller::{FocusRequest, Mode, Refusal, WatchConfig};
 use evfocus_ipc::Calibration;
 use serde::Deserialize;
 
@@ -22,6 +23,7 @@ use crate::reports::Kept;
 
 pub use access::AccessSection;
 pub use camera::{Bias, CameraConfig, CameraSection};
+pub use continuous::ContinuousSection;
 pub use focus::FocusSection;
 pub use lens::{
     DriveSection, FirmataSection, GrblSection, IndiSection, LabJackSection, LensBackend, LensDriver,
@@ -48,6 +50,8 @@ pub struct ConfigFile {
     pub camera: CameraSection,
     /// The lens.
     pub lens: LensSection,
+    /// When mode continuous starts a run by itself.
+    pub continuous: ContinuousSection,
     /// How to focus.
     pub focus: FocusSection,
     /// The simulated rig, for what is simulated.
@@ -66,7 +70,8 @@ pub struct DaemonSection {
     pub reports_kept: u32,
     /// After how many days reports are deleted, however few there are; 1 to 36,500; absent: never.
     pub report_days: Option<u32>,
-    /// `auto`: focus runs when triggered; `manual`: the caller moves the lens.
+    /// `auto`: focus runs when triggered; `manual`: the caller moves the lens; `continuous`: focus runs also when the picture has lost
+    /// its sharpness.
     pub mode: String,
 }
 
@@ -107,6 +112,8 @@ pub struct Config {
     pub lens_max: Option<LensPosition>,
     /// The camera.
     pub camera: CameraConfig,
+    /// When mode continuous starts a run by itself.
+    pub continuous: WatchConfig,
     /// How to focus.
     pub focus: FocusSection,
     /// The simulated rig.
@@ -187,7 +194,11 @@ impl Config {
         let mode = match file.daemon.mode.as_str() {
             "auto" => Mode::Auto,
             "manual" => Mode::Manual,
-            other => return Err(BadValue::new("daemon.mode", other, "it must be \"auto\" or \"manual\"")),
+            "continuous" => Mode::Continuous,
+            other => {
+                let remedy = "it must be \"auto\", \"manual\" or \"continuous\"";
+                return Err(BadValue::new("daemon.mode", other, remedy));
+            }
         };
         let reports = f64::from(file.daemon.reports_kept);
         BadValue::check("daemon.reports_kept", reports, 1.0, 1e6)?;
@@ -220,6 +231,7 @@ impl Config {
             lens_max: file.lens.max_counts.map(LensPosition),
             rig: file.simulation.rig(lens.emulated().as_ref())?,
             lens,
+            continuous: file.continuous.check()?,
             focus: file.focus,
         };
         // Against the lens, where it is known without asking it, and the default run against both: now rather than at the
@@ -264,6 +276,7 @@ impl Config {
             // The last approach must take the play up.
             controller.approach_margin = controller.approach_margin.max(2.0 * controller.backlash);
         }
+        controller.watch = self.continuous;
         controller.lens_samples = polls as usize * 2 + 1_000;
         Ok(controller)
     }

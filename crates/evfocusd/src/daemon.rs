@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use evfocus_core::controller::{Command as CoreCommand, Mode};
+use evfocus_core::controller::Command as CoreCommand;
 use evfocus_core::{Controller, ControllerConfig, EventBatch, RunId};
 use evfocus_hal::{CameraInfo, Clock, LensInfo, SystemClock};
 use evfocus_ipc::server::Limits;
@@ -351,10 +351,8 @@ impl Prepared {
         settings.delays = rig_delay.as_ref().and_then(RigDelayFile::read).unwrap_or_default();
         let mut controller = Controller::new(settings, camera.geometry, clock.now());
         controller.number_runs_from(RunId(store.newest_on_disk().map_or(1, |newest| newest + 1)));
-        if config.mode == Mode::Manual {
-            // An idle controller refuses no change of mode and has nothing to do for it.
-            controller.command(CoreCommand::SetMode(Mode::Manual), clock.now(), &mut Vec::new())?;
-        }
+        // An idle controller refuses no change of mode and has nothing to do for it.
+        controller.command(CoreCommand::SetMode(config.mode), clock.now(), &mut Vec::new())?;
         Ok(Self { controller, access, store, rig_delay, run_devices, calibration, calibration_file, desk })
     }
 }

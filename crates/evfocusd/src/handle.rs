@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use evfocus_core::controller::Pause;
 pub use evfocus_ipc::client::Reloaded;
 use evfocus_ipc::{Calibration, Device, Error, FocusRequest, Mode, Progress, Report, Status};
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
@@ -47,6 +48,13 @@ pub enum Command {
     SetMode {
         /// The new mode.
         mode: Mode,
+        /// Done.
+        answer: Answer<()>,
+    },
+    /// Pause continuous mode, or go on with it.
+    Pause {
+        /// Which, and when.
+        pause: Pause,
         /// Done.
         answer: Answer<()>,
     },

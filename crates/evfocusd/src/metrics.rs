@@ -36,6 +36,7 @@ struct Figures {
     events: u64,
     lost: u64,
     event_rate: f64,
+    continuous_runs: u64,
     camera: Health,
     lens: Health,
 }
@@ -100,6 +101,7 @@ impl Metrics {
         let mut figures = self.figures();
         (figures.events, figures.lost) = (snapshot.events, snapshot.lost);
         figures.event_rate = snapshot.event_rate.0;
+        figures.continuous_runs = snapshot.continuous_runs;
         figures.camera.observe(snapshot.camera_ready);
         figures.lens.observe(snapshot.lens_ready);
     }
@@ -139,6 +141,12 @@ impl Metrics {
         );
         for (name, kind, help, value) in [
             ("evfocus_run_events_total", "counter", "Events counted in sweeps", figures.run_events as f64),
+            (
+                "evfocus_continuous_runs_total",
+                "counter",
+                "Focus runs that continuous mode started",
+                figures.continuous_runs as f64,
+            ),
             ("evfocus_events_total", "counter", "Events read from the camera", figures.events as f64),
             ("evfocus_events_lost_total", "counter", "Events known to be lost", figures.lost as f64),
             ("evfocus_event_rate", "gauge", "Events per second", figures.event_rate),

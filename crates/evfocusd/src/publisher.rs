@@ -210,6 +210,8 @@ impl Publisher {
         };
         Status {
             mode: wire::mode(snapshot.mode),
+            pause: wire::pause_state(snapshot.pause),
+            sharpness: snapshot.sharpness,
             state: wire::state(snapshot.state),
             phase: match snapshot.phase {
                 None if seen.calibrating => ipc::Phase::Calibrating,

@@ -15,7 +15,7 @@ use crate::reports::Reports;
 /// Reads the configuration again.
 pub type Reread = Box<dyn Fn() -> Result<Config, ConfigError> + Send + Sync>;
 
-/// Applies what can be changed while running: `[focus]`, `[access]`, the play of the lens, and how many reports are kept.
+/// Applies what can be changed while running: `[continuous]`, `[focus]`, `[access]`, the play of the lens, and how many reports are kept.
 pub(crate) struct Reloader {
     reread: Reread,
     /// What holds now.
@@ -59,6 +59,7 @@ impl Reloader {
         let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         let reloaded = Reloaded { applied: applicable(&current, &new), needs_restart: fixed(&current, &new) };
         let next = Config {
+            continuous: new.continuous,
             focus: new.focus,
             access: new.access,
             lens_backlash: new.lens_backlash,
@@ -82,6 +83,7 @@ impl Reloader {
 /// What has changed and holds at once.
 fn applicable(old: &Config, new: &Config) -> Vec<String> {
     names(&[
+        ("continuous", old.continuous != new.continuous),
         ("focus", old.focus != new.focus),
         ("access", old.access != new.access),
         ("lens.backlash_counts", old.lens_backlash != new.lens_backlash),

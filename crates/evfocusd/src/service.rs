@@ -7,8 +7,9 @@ use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
+use evfocus_core::controller::Pause;
 use evfocus_ipc::server::{self, CallError, Info, Limits, Peer, Service, Socket, Stream};
-use evfocus_ipc::{Calibration, Error, FocusRequest, ProtocolError, Reply, Request};
+use evfocus_ipc::{Calibration, Error, FocusRequest, PauseWhen, ProtocolError, Reply, Request};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 
@@ -63,6 +64,18 @@ impl Service for Controller {
             Request::Calibrate => Ok(Reply::Calibration { calibration: Box::new(self.calibrate().await?) }),
             Request::SetMode { mode } => {
                 self.command(|answer| Command::SetMode { mode, answer }).await?;
+                Ok(Reply::Done {})
+            }
+            Request::Pause { when } => {
+                let pause = match when.unwrap_or_default() {
+                    PauseWhen::Immediate => Pause::Immediate,
+                    PauseWhen::Deferred => Pause::Deferred,
+                };
+                self.command(|answer| Command::Pause { pause, answer }).await?;
+                Ok(Reply::Done {})
+            }
+            Request::Resume => {
+                self.command(|answer| Command::Pause { pause: Pause::Resume, answer }).await?;
                 Ok(Reply::Done {})
             }
             Request::Monitor => match stream {

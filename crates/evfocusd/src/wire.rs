@@ -5,7 +5,7 @@ mod report;
 use std::fmt::Display;
 use std::time::Duration;
 
-use evfocus_core::controller::{FocusRequest, FocusState, Mode, Pace, Refusal};
+use evfocus_core::controller::{FocusRequest, FocusState, Mode, Pace, PauseState, Refusal};
 use evfocus_core::{Directions, Geometry, LensPosition, LensRange, LensSpeed, Method, Phase, Prefer};
 use evfocus_ipc as ipc;
 
@@ -78,6 +78,9 @@ pub(crate) fn refusal(refusal: &Refusal) -> ipc::Error {
     match *refusal {
         Refusal::Busy { run } => ipc::Error::Busy { run_id: run.0 },
         Refusal::ManualMode => ipc::Error::WrongMode { mode: ipc::Mode::Manual, needed: ipc::Mode::Auto },
+        Refusal::NotContinuous { mode: present } => {
+            ipc::Error::WrongMode { mode: mode(present), needed: ipc::Mode::Continuous }
+        }
         Refusal::NoCamera => ipc::Error::NoSuchDevice {
             role: ipc::DeviceRole::Camera,
             remedy: "connect the camera; ListDevices says what is there".to_owned(),
@@ -111,6 +114,7 @@ pub(crate) fn core_mode(mode: ipc::Mode) -> Mode {
     match mode {
         ipc::Mode::Manual => Mode::Manual,
         ipc::Mode::Auto => Mode::Auto,
+        ipc::Mode::Continuous => Mode::Continuous,
     }
 }
 
@@ -119,6 +123,16 @@ pub(crate) fn mode(mode: Mode) -> ipc::Mode {
     match mode {
         Mode::Manual => ipc::Mode::Manual,
         Mode::Auto => ipc::Mode::Auto,
+        Mode::Continuous => ipc::Mode::Continuous,
+    }
+}
+
+/// The socket's word for whether continuous mode is paused.
+pub(crate) fn pause_state(state: PauseState) -> ipc::PauseState {
+    match state {
+        PauseState::Running => ipc::PauseState::Running,
+        PauseState::Pausing => ipc::PauseState::Pausing,
+        PauseState::Paused => ipc::PauseState::Paused,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use super::WatchConfig;
 use super::request::Pace;
 use crate::analysis::SweepLimits;
 use crate::answer::{Prefer, Rules};
@@ -74,6 +75,8 @@ pub struct ControllerConfig {
     pub largest_clock_residual: Duration,
     /// What happens to the lens when a run fails.
     pub on_failure: OnFailure,
+    /// When continuous mode starts a run.
+    pub watch: WatchConfig,
     /// Room for the events of a sweep.
     pub capacity: SweepCapacity,
     /// Lens samples kept; at 1 kHz a minute is 60,000.
@@ -109,6 +112,7 @@ impl ControllerConfig {
             largest_mismatch_share: 0.15,
             largest_clock_residual: Duration::from_millis(20),
             on_failure: OnFailure::Restore,
+            watch: WatchConfig::default(),
             capacity: SweepCapacity::default(),
             lens_samples: 60_000,
         }

@@ -1,6 +1,6 @@
 //! What goes into the controller, what comes out, and what can be seen of it.
 
-use super::Mode;
+use super::{Mode, PauseState};
 use crate::event::EventBatch;
 use crate::lens_trace::LensSample;
 use crate::report::{Phase, RunId};
@@ -70,8 +70,14 @@ pub enum FocusState {
 /// What can be seen from outside at any moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Snapshot {
-    /// Manual or auto.
+    /// Manual, auto or continuous.
     pub mode: Mode,
+    /// Whether continuous mode may start runs.
+    pub pause: PauseState,
+    /// How sharp the picture is as a share of what it was in focus; nothing unless continuous mode knows.
+    pub sharpness: Option<f64>,
+    /// Runs that continuous mode has started.
+    pub continuous_runs: u64,
     /// Idle, scanning, focused or failed.
     pub state: FocusState,
     /// What the run under way is doing.

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::ControllerConfig;
+use super::{ControllerConfig, Pause};
 use crate::answer::Prefer;
 use crate::event::{Geometry, Window};
 use crate::report::{Directions, FocusPlan, RunId, Windows};
@@ -16,6 +16,19 @@ pub enum Mode {
     Manual,
     /// The lens focuses when triggered, and never moves without a trigger.
     Auto,
+    /// The lens focuses when triggered, when focus is not known, and when the picture has lost its sharpness.
+    Continuous,
+}
+
+impl Mode {
+    /// The name users know it by.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Manual => "manual",
+            Self::Auto => "auto",
+            Self::Continuous => "continuous",
+        }
+    }
 }
 
 /// How thorough a run is.
@@ -78,12 +91,14 @@ pub struct FocusRequest {
 pub enum Command {
     /// Start a focus run.
     Focus(FocusRequest),
-    /// Stop whatever is under way; the lens stays where it is then.
+    /// Stop whatever is under way; the lens stays where it is then, and continuous mode is paused.
     Abort,
     /// Move the lens.
     MoveTo(LensPosition),
     /// Change the mode; a change ends a run under way.
     SetMode(Mode),
+    /// Pause continuous mode, or go on with it.
+    Pause(Pause),
 }
 
 /// A command that was taken.
@@ -107,8 +122,14 @@ pub enum Refusal {
         run: RunId,
     },
     /// A focus run was asked for in manual mode.
-    #[error("focus runs need mode auto; the mode is manual")]
+    #[error("focus runs need mode auto or continuous; the mode is manual")]
     ManualMode,
+    /// Pausing was asked for in a mode that does nothing by itself.
+    #[error("only mode continuous can be paused or resumed; the mode is {}", mode.name())]
+    NotContinuous {
+        /// The mode.
+        mode: Mode,
+    },
     /// There is no camera.
     #[error("no camera is connected")]
     NoCamera,

@@ -393,6 +393,11 @@ impl Controller {
             Outcome::Aborted => FocusState::Idle,
         };
         let Some(run) = self.run.take() else { return };
+        let window = run
+            .answer
+            .and_then(|answer| answer.window)
+            .and_then(|index| run.plan.windows.get(usize::from(index)).copied().flatten());
+        self.note_outcome(outcome, run.position_before, window, now);
         self.report = Some(RunReport {
             id: run.id,
             plan: run.plan,

@@ -53,6 +53,8 @@ impl Service for Plain {
             (Request::Focus(_), _) => std::future::pending().await,
             (
                 Request::SetMode { .. }
+                | Request::Pause { .. }
+                | Request::Resume
                 | Request::GetReport { .. }
                 | Request::ListDevices { .. }
                 | Request::Calibrate

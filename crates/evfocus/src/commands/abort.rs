@@ -17,7 +17,7 @@ Examples:
   evfocus abort
   evfocus abort --json
 
-It is not an error if no run is under way. JSON: run_id is the run that was stopped, or null.")]
+It is not an error if no run is under way. Mode continuous is paused, see evfocus resume. JSON: run_id is the run that was stopped, or null.")]
 pub struct Arguments {
     #[command(flatten)]
     socket: SocketArguments,

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use clap::Args;
-use evfocus_ipc::{LastRun, State, Status};
+use evfocus_ipc::{LastRun, PauseState, State, Status};
 
 use crate::arguments::SocketArguments;
 use crate::connection::{block_on, connect};
@@ -44,7 +44,10 @@ fn print(status: &Status, out: &mut Output) -> anyhow::Result<()> {
         Some(id) => writeln!(out, "state     {}, run {id}: {}", status.state, status.phase)?,
         None => writeln!(out, "state     {}", status.state)?,
     }
-    writeln!(out, "mode      {}", status.mode)?;
+    writeln!(out, "mode      {}", mode(status))?;
+    if let Some(share) = status.sharpness {
+        writeln!(out, "sharpness {:.0} % of that in focus", 100.0 * share)?;
+    }
     writeln!(out, "camera    {}", status.camera.as_deref().unwrap_or("none"))?;
     writeln!(out, "lens      {}", status.lens.as_deref().unwrap_or("none"))?;
     writeln!(out, "position  {}", position(status))?;
@@ -64,6 +67,14 @@ fn print(status: &Status, out: &mut Output) -> anyhow::Result<()> {
     }
     writeln!(out, "daemon    version {}, up for {:.0} s", status.version, status.uptime_s)?;
     Ok(())
+}
+
+/// The mode, and whether it rests.
+fn mode(status: &Status) -> String {
+    match status.pause {
+        PauseState::Running => status.mode.to_string(),
+        state @ (PauseState::Pausing | PauseState::Paused) => format!("{}, {}", status.mode, state.name()),
+    }
 }
 
 /// Where the lens is, and whether it moves.

@@ -1,6 +1,6 @@
 //! The calibration that counts, and the one under way.
 
-use evfocus_core::controller::{Action, Command, DeviceFailure};
+use evfocus_core::controller::{Action, Command, DeviceFailure, Mode, Pause, PauseState, Snapshot};
 use evfocus_core::{Controller, ControllerConfig, DelayModel, HostMicros, LensSample, LensSpeed};
 use evfocus_hal::LensInfo;
 use evfocus_ipc::Calibration;
@@ -20,12 +20,14 @@ pub(crate) struct Desk {
     known: Option<Calibration>,
     /// With what was known of the pixels' delay before: the focus runs of a calibration do not know of the play.
     under_way: Option<(Calibrator, DelayModel)>,
+    /// Continuous mode was at work when the calibration began.
+    to_resume: bool,
 }
 
 impl Desk {
     /// For `lens`, of which `known` was measured before.
     pub(crate) fn new(config: Config, lens: LensInfo, known: Option<Calibration>) -> Self {
-        Self { config, lens, known, under_way: None }
+        Self { config, lens, known, under_way: None, to_resume: false }
     }
 
     /// The controller's settings.
@@ -67,6 +69,9 @@ impl Desk {
     ) -> Result<(), String> {
         // Of the lens as it is configured: what was measured before does not count.
         let settings = self.config.controller(&self.lens, None).map_err(|bad| bad.to_string())?;
+        let Snapshot { mode, pause, .. } = controller.snapshot();
+        self.to_resume = mode == Mode::Continuous && pause == PauseState::Running;
+        // That pauses continuous mode, too.
         controller.command(Command::Abort, now, actions).map_err(|refusal| refusal.to_string())?;
         let lens = devices::name(&self.lens.model, &self.lens.serial);
         tracing::info!(lens, limits = %settings.limits, "calibrating the lens");
@@ -120,6 +125,11 @@ impl Desk {
                 controller.set_delays(delays);
             }
             Err(error) => tracing::error!(%error, "the calibration does not suit the configuration"),
+        }
+        if core::mem::take(&mut self.to_resume)
+            && let Err(refusal) = controller.command(Command::Pause(Pause::Resume), now, actions)
+        {
+            tracing::debug!(%refusal, "continuous mode does not go on");
         }
         Some(ended)
     }

@@ -132,8 +132,7 @@ impl ControlThread {
             self.take_notices(&mut actions);
             self.take_samples(&mut actions);
             self.take_batches(&mut actions);
-            self.controller.handle(Input::Tick, self.clock.now(), &mut actions);
-            self.perform(&mut actions);
+            self.tick(&mut actions);
             self.calibrate(&mut actions);
             self.take_commands(&mut actions);
             self.publish_curve(&mut curve_sent);
@@ -147,6 +146,19 @@ impl ControlThread {
         if self.controller.command(CoreCommand::Abort, self.clock.now(), &mut actions).is_ok() {
             self.perform(&mut actions);
         }
+    }
+
+    fn tick(&mut self, actions: &mut Vec<Action>) {
+        let before = self.controller.snapshot();
+        self.controller.handle(Input::Tick, self.clock.now(), actions);
+        let Snapshot { continuous_runs, run, .. } = self.controller.snapshot();
+        if continuous_runs != before.continuous_runs {
+            let pace = self.controller.continuous_request().pace;
+            self.pace = pace.unwrap_or(self.controller.config().pace);
+            let (run, sharpness) = (run.map(|run| run.0), before.sharpness);
+            tracing::debug!(run, sharpness, "focus is not known, or lost: a run starts by itself");
+        }
+        self.perform(actions);
     }
 
     fn take_notices(&mut self, actions: &mut Vec<Action>) {
@@ -213,6 +225,10 @@ impl ControlThread {
                 Command::SetMode { mode, answer } => {
                     let done =
                         self.controller.command(CoreCommand::SetMode(wire::core_mode(mode)), now, actions);
+                    reply(answer, done.map(|_| ()).map_err(|refusal| wire::refusal(&refusal)));
+                }
+                Command::Pause { pause, answer } => {
+                    let done = self.controller.command(CoreCommand::Pause(pause), now, actions);
                     reply(answer, done.map(|_| ()).map_err(|refusal| wire::refusal(&refusal)));
                 }
                 Command::Configure { config } => self.new_settings = Some(config),
@@ -311,7 +327,9 @@ impl ControlThread {
                 reply(answer, Ok(None));
             }
             Command::Focus { answer, .. } => reply(answer, Err(refused())),
-            Command::MoveTo { answer, .. } | Command::SetMode { answer, .. } => reply(answer, Err(refused())),
+            Command::MoveTo { answer, .. }
+            | Command::SetMode { answer, .. }
+            | Command::Pause { answer, .. } => reply(answer, Err(refused())),
             Command::Calibrate { answer } => reply(answer, Err(refused())),
             Command::Configure { config } => self.new_settings = Some(config),
         }
@@ -367,8 +385,8 @@ impl ControlThread {
     fn publish(&mut self, published: &mut (HostMicros, Seen)) {
         let (now, seen) = (self.clock.now(), self.seen());
         let state = |seen: &Seen| {
-            let Snapshot { mode, state, phase, run, .. } = seen.snapshot;
-            (mode, state, phase, run, seen.calibrating, seen.lens_moving)
+            let Snapshot { mode, pause, state, phase, run, .. } = seen.snapshot;
+            (mode, pause, state, phase, run, seen.calibrating, seen.lens_moving)
         };
         let changed = state(&seen) != state(&published.1);
         if changed || now.since(published.0) >= PUBLISH {

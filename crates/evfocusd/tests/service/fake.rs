@@ -7,11 +7,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use evfocus_core::controller::Pause;
 use evfocus_ipc::client::Client;
 use evfocus_ipc::server::{Limits, Socket};
 use evfocus_ipc::{
     CurvePoint, Device, DeviceRole, DeviceState, Error, FocusRequest, LastRun, LensRange, Mode, Outcome,
-    Phase, Progress, REPORT_FORMAT, Report, RunDevices, State, Status,
+    PauseState, Phase, Progress, REPORT_FORMAT, Report, RunDevices, State, Status,
 };
 use evfocusd::access::Access;
 use evfocusd::handle::{Command, Handle, Lookups, Reloaded};
@@ -141,6 +142,13 @@ impl Fake {
                 Command::SetMode { mode, answer } => {
                     self.state.lock().unwrap().mode = mode;
                     self.change(|status| status.mode = mode);
+                    drop(answer.send(Ok(())));
+                }
+                Command::Pause { pause, answer } => {
+                    self.change(|status| {
+                        status.pause =
+                            if pause == Pause::Resume { PauseState::Running } else { PauseState::Paused };
+                    });
                     drop(answer.send(Ok(())));
                 }
                 Command::Configure { .. } => {}
