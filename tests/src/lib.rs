@@ -1,5 +1,6 @@
 //! What the workspace tests share.
 
+pub mod continuous;
 pub mod fault_laboratory;
 pub mod lens_faults;
 pub mod lenses;

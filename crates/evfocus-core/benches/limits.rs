@@ -13,7 +13,7 @@ use std::time::Instant;
 use evfocus_core::search::Travel;
 use evfocus_core::{
     Analyzer, CameraMicros, CumulativeCounter, Event, Geometry, LegReport, Method, Question, Searcher,
-    SweepCapacity, SweepLimits, SweepRecorder,
+    SharpnessMeter, SweepCapacity, SweepLimits, SweepRecorder,
 };
 
 #[path = "support/sweep.rs"]
@@ -29,6 +29,8 @@ const MOST_NS_PER_EVENT_READ: f64 = 25.0;
 const MOST_NS_PER_EVENT_OF_AUTO: f64 = 60.0;
 /// And nobody waits for the answer, even of a sweep of two million events.
 const MOST_MS_FOR_A_RESULT: f64 = 50.0;
+/// What watching for lost focus costs, day and night.
+const MOST_NS_PER_EVENT_WATCHED: f64 = 5.0;
 /// Whether the sweep may end is asked while events come in.
 const MOST_MS_TO_DECIDE: f64 = 5.0;
 const SMALL: Geometry = Geometry { width: 346, height: 260 };
@@ -39,8 +41,22 @@ const BATCHES: usize = 100;
 /// Nanoseconds an event that `work` spends on 100 million events, as a hundred batches that follow one another in time; only the work
 /// is measured, not the making of events. For each batch the shortest of all repeats counts: on a busy machine no repeat goes
 /// through from begin to end undisturbed, but each batch, a millisecond, does at some time.
-fn ns_per_event(length_us: i64, mut begin: impl FnMut(), mut work: impl FnMut(&[Event])) -> f64 {
+fn ns_per_event(length_us: i64, begin: impl FnMut(), work: impl FnMut(&[Event])) -> f64 {
+    ns_per_event_at(sweep::GEOMETRY, length_us, begin, work)
+}
+
+/// The same for another sensor.
+fn ns_per_event_at(
+    geometry: Geometry,
+    length_us: i64,
+    mut begin: impl FnMut(),
+    mut work: impl FnMut(&[Event]),
+) -> f64 {
     let mut batch = sweep::batch(0, length_us);
+    for event in &mut batch {
+        event.x %= geometry.width;
+        event.y %= geometry.height;
+    }
     let mut shortest = [Duration::MAX; BATCHES];
     for _ in 0..REPEATS {
         begin();
@@ -205,6 +221,22 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         assert_eq!(counter.borrow().totals().0 + counter.borrow().totals().1, 100_000_000);
         let what = format!("count 100 M events at {rate}, {size} at a time");
         all_within &= within(&what, figure, MOST_NS_PER_EVENT, "ns/event");
+    }
+    // A million events a second, a busy scene, and ten of them.
+    for (rate, length_us) in [("1 M/s", 1_000_000), ("10 M/s", 100_000)] {
+        let meter = RefCell::new(SharpnessMeter::new(SMALL));
+        let figure = ns_per_event_at(
+            SMALL,
+            length_us,
+            || meter.borrow_mut().restart(),
+            |batch| {
+                for events in batch.chunks(512) {
+                    black_box(meter.borrow_mut().take(events));
+                }
+            },
+        );
+        let what = format!("watch for lost focus at {rate}, 346 x 260");
+        all_within &= within(&what, figure, MOST_NS_PER_EVENT_WATCHED, "ns/event");
     }
     let micros = |spent: Duration| spent.as_secs_f64() * 1e6;
     let spent = searches([(10_000_000, 0), (100_000_000, 0), (10_000_000, 10_000_000)])?;

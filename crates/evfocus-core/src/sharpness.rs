@@ -19,6 +19,8 @@ const LAGS: [usize; 3] = [1, 2, 8];
 const REACH: usize = 8;
 /// A picture is complete when one of so many pixels has seen an event: the scene has moved by a fraction of a pixel then.
 const PIXELS_PER_EVENT: usize = 16;
+/// Or, of a small window, so many pixels.
+const FEWEST_PIXELS: usize = 256;
 /// A picture that takes longer than this is given up: it would be noise mostly.
 const LONGEST_PICTURE: Duration = Duration::from_secs(1);
 /// From the begin of one picture to the next: what bounds the work at high event rates.
@@ -29,6 +31,11 @@ const SIGNIFICANT: f64 = 12.0;
 const FEWEST_PICTURES: u32 = 8;
 /// Pictures that have not come to a reading by then say nothing.
 const MOST_PICTURES: u32 = 200;
+
+/// How many pixels with an event make a picture of `pixels`.
+fn pixels_of_picture(pixels: usize) -> usize {
+    (pixels / PIXELS_PER_EVENT).max(FEWEST_PIXELS).min(pixels / 2).max(1)
+}
 
 /// Turns events into readings of sharpness: 1 for edges as fine as a pixel, towards 0 for coarser ones. All memory is allocated at the
 /// start: a byte a pixel, and four for each pixel of a picture.
@@ -51,7 +58,7 @@ impl SharpnessMeter {
     /// A meter that looks at the whole of a sensor.
     pub fn new(geometry: Geometry) -> Self {
         let stride = usize::from(geometry.width) + REACH;
-        let enough = geometry.pixels() / PIXELS_PER_EVENT;
+        let enough = pixels_of_picture(geometry.pixels());
         Self {
             window: Window::whole(geometry),
             stride,
@@ -69,8 +76,9 @@ impl SharpnessMeter {
     pub fn look_at(&mut self, window: Window) {
         self.restart();
         self.window = window;
+        // Of what was allocated for the whole.
         let pixels = usize::from(window.width) * usize::from(window.height);
-        self.enough = (pixels / PIXELS_PER_EVENT).clamp(1, self.touched.capacity());
+        self.enough = pixels_of_picture(pixels).min(self.touched.capacity());
     }
 
     /// Forgets all events.
@@ -160,5 +168,103 @@ impl SharpnessMeter {
     fn forget_sums(&mut self) {
         self.likeness = [0; LAGS.len()];
         (self.pairs, self.pictures) = (0, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::event::Polarity;
+
+    const GEOMETRY: Geometry = Geometry { width: 160, height: 120 };
+
+    /// Events of a second from stripes of `stripe` pixels that move on and on, so that events of one sign sweep over them; `share` of
+    /// them, the rest is noise.
+    fn events(rate: u64, stripe: u64, share: f64) -> Vec<Event> {
+        let mut random: u64 = 0x9E37_79B9_7F4A_7C15;
+        let mut next = || {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            random >> 8
+        };
+        let event = |index: u64| {
+            let (x, y) = (next() % 160, next() % 120);
+            let is_noise = (next() % 1000) as f64 >= 1000.0 * share;
+            let on = if is_noise { next() % 2 == 1 } else { (x / stripe + y / stripe) % 2 == 1 };
+            let t = CameraMicros((index * 1_000_000 / rate) as i64);
+            Event { t, x: x as u16, y: y as u16, polarity: Polarity::from_on(on) }
+        };
+        (0..rate).map(event).collect()
+    }
+
+    fn reading(rate: u64, stripe: u64, share: f64) -> Option<f64> {
+        SharpnessMeter::new(GEOMETRY).take(&events(rate, stripe, share))
+    }
+
+    #[test]
+    fn finer_structure_reads_higher_at_every_rate() {
+        for rate in [200_000, 1_000_000, 5_000_000] {
+            let [fine, middle, coarse] =
+                [3, 6, 8].map(|stripe| reading(rate, stripe, 0.9).unwrap_or_else(|| panic!("{rate}")));
+            assert!(fine > 1.2 * middle && middle > 1.2 * coarse, "{rate}: {fine} {middle} {coarse}");
+            let slow = reading(100_000, 3, 0.9).unwrap_or_else(|| panic!("{rate}"));
+            // A reading is significant by 12 standard deviations.
+            assert!((fine / slow - 1.0).abs() < 2.0 / 12.0, "{rate}: {fine} {slow}");
+        }
+    }
+
+    #[test]
+    fn noise_silence_and_light_say_nothing() {
+        assert_eq!(reading(1_000_000, 3, 0.0), None);
+        assert_eq!(reading(500, 3, 1.0), None);
+        let light: Vec<_> =
+            events(1_000_000, 3, 0.0).into_iter().map(|e| Event { polarity: Polarity::On, ..e }).collect();
+        assert_eq!(SharpnessMeter::new(GEOMETRY).take(&light), None);
+    }
+
+    #[test]
+    fn noise_lowers_no_reading() {
+        let (clean, noisy) = (reading(1_000_000, 3, 1.0), reading(1_000_000, 3, 0.7));
+        let ratio = clean.zip(noisy).map(|(clean, noisy)| noisy / clean);
+        assert!(ratio.is_some_and(|ratio| (ratio - 1.0).abs() < 0.1), "{clean:?} {noisy:?}");
+    }
+
+    #[test]
+    fn batches_of_any_size_read_alike_and_only_the_window_counts() {
+        let all = events(1_000_000, 3, 0.9);
+        let mut meter = SharpnessMeter::new(GEOMETRY);
+        let pieces: Vec<_> = all.chunks(97).filter_map(|piece| meter.take(piece)).collect();
+        assert_eq!(pieces.last().copied(), SharpnessMeter::new(GEOMETRY).take(&all));
+        // Outside of the window the stripes are wide.
+        let mut mixed = events(1_000_000, 9, 0.9);
+        for (event, fine) in mixed.iter_mut().zip(&all) {
+            if fine.x >= 80 {
+                *event = *fine;
+            } else if event.x >= 80 {
+                event.x -= 80;
+            }
+        }
+        meter.look_at(Window { x: 80, y: 0, width: 80, height: 120 });
+        let (window, whole) = (meter.take(&mixed), pieces.last());
+        let ratio = window.zip(whole).map(|(window, whole)| window / whole);
+        assert!(ratio.is_some_and(|ratio| (ratio - 1.0).abs() < 0.1), "{window:?} {whole:?}");
+    }
+
+    #[test]
+    fn a_camera_that_counts_anew_is_read_on() {
+        let mut meter = SharpnessMeter::new(GEOMETRY);
+        let late = |event: Event| Event { t: CameraMicros(event.t.0 + 1_000_000_000), ..event };
+        assert!(meter.take(&events(1_000_000, 3, 0.9).into_iter().map(late).collect::<Vec<_>>()).is_some());
+        assert!(meter.take(&events(1_000_000, 3, 0.9)).is_some());
+        // Or has no time at all.
+        assert!(
+            meter
+                .take(&[Event { t: CameraMicros(i64::MAX), x: 500, y: 500, polarity: Polarity::On }])
+                .is_none()
+        );
+        meter.take(&[Event { t: CameraMicros(i64::MIN), x: 5, y: 5, polarity: Polarity::On }]);
     }
 }

@@ -1,6 +1,7 @@
 //! The event path allocates nothing: from the start of the sweep to the result, and in the clock map ever.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test whose own fixture is missing fails")]
 
+use evfocus_core::controller::{Command, Mode};
 use evfocus_core::{CameraMicros, ClockMap, HostMicros, Method, Outcome, Phase};
 
 #[path = "support/allocations.rs"]
@@ -40,6 +41,20 @@ fn a_run_allocates_nothing_from_the_start_of_the_sweep_to_the_result() {
         assert!(rig.controller.snapshot().events > events + 20_000);
         assert_eq!(allocations, 0, "{method}");
     }
+}
+
+#[test]
+fn watching_for_lost_focus_allocates_nothing() {
+    let mut rig = rig::Rig::new(rig::config());
+    rig.scene.stripe = 3;
+    rig.command(Command::SetMode(Mode::Continuous)).unwrap();
+    rig.step();
+    rig.finish(|_, _| {});
+    rig.steps(10);
+    let allocations = allocations_in(|| rig.steps(5_000));
+    let snapshot = rig.controller.snapshot();
+    assert!(snapshot.sharpness.is_some() && snapshot.run.is_none(), "{snapshot:?}");
+    assert_eq!(allocations, 0);
 }
 
 #[test]

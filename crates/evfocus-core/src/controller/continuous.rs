@@ -9,6 +9,9 @@ use crate::lens_trace::LensSample;
 use crate::report::{Outcome, RunId};
 use crate::units::{HostMicros, LensPosition};
 
+/// Two answers that differ by less than this share of the range are the same, or by less than the depth of focus.
+const AS_GOOD_AS: f64 = 0.01;
+
 /// Whether continuous mode may start runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PauseState {
@@ -187,7 +190,8 @@ impl Controller {
         self.continuous.focus_at = Some(there);
         self.continuous.watcher.learn(window, now);
         // A run that found what was there before was not needed, and the next one is likely to be as idle.
-        let found_news = there.distance(before) > 2.0 * self.config.position_tolerance;
+        let found_news =
+            there.distance(before) > self.config.depth_of_focus.max(AS_GOOD_AS * self.config.limits.length());
         self.continuous.watcher.run_ended(found_news || !is_own, now);
     }
 }

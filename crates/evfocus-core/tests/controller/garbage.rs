@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use evfocus_core::controller::{Command, DeviceFailure, FocusRequest, Input, Mode};
+use evfocus_core::controller::{Command, DeviceFailure, FocusRequest, Input, Mode, Pause};
 use evfocus_core::{
     CameraMicros, ControllerConfig, Event, EventBatch, HostMicros, LensPosition, LensRange, LensSample,
     LensSpeed, Method, Polarity, SweepCapacity,
@@ -45,7 +45,8 @@ fn commands() -> impl Strategy<Value = Command> {
         2 => requests.prop_map(Command::Focus),
         1 => Just(Command::Abort),
         1 => wild(0.0..1e3).prop_map(|position| Command::MoveTo(LensPosition(position))),
-        1 => prop_oneof![Just(Mode::Auto), Just(Mode::Manual)].prop_map(Command::SetMode),
+        1 => prop_oneof![Just(Mode::Auto), Just(Mode::Manual), Just(Mode::Continuous)].prop_map(Command::SetMode),
+        1 => prop_oneof![Just(Pause::Immediate), Just(Pause::Deferred), Just(Pause::Resume)].prop_map(Command::Pause),
     ]
 }
 
@@ -140,6 +141,10 @@ proptest! {
                 Happening::LensFault(fault) => rig.lens_fault = fault,
                 Happening::CameraFault(fault) => rig.camera_fault = fault,
             }
+        }
+        // Continuous mode would go on for ever.
+        if rig.controller.snapshot().mode == Mode::Continuous {
+            prop_assert!(rig.command(Command::Pause(Pause::Deferred)).is_ok());
         }
         for _ in 0..30_000 {
             if rig.controller.snapshot().run.is_none() {

@@ -6,6 +6,7 @@ mod random;
 mod rig;
 
 mod abort;
+mod continuous;
 mod failures;
 mod focus;
 mod garbage;

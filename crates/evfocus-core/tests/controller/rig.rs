@@ -61,6 +61,8 @@ pub(crate) struct Scene {
     pub(crate) flicker: f64,
     /// Share of the events that follow the picture: stripes that gain contrast on the way to focus and lose it beyond.
     pub(crate) texture: f64,
+    /// Width of the stripes, pixels: blur makes them wider.
+    pub(crate) stripe: u16,
 }
 
 #[derive(Debug)]
@@ -112,6 +114,7 @@ impl Rig {
             highest_rate: f64::INFINITY,
             flicker: 0.0,
             texture: 0.9,
+            stripe: 2,
         };
         let mut rig = Self {
             controller: Controller::new(config, GEOMETRY, now),
@@ -255,7 +258,7 @@ impl Rig {
             let chance = self.random.uniform();
             let place = self.random.next();
             let (x, y) = (place as u16 % GEOMETRY.width, (place >> 16) as u16 % GEOMETRY.height);
-            let stripe = if x / 2 % 2 == 0 { 1.0 } else { -1.0 };
+            let stripe = if x / self.scene.stripe % 2 == 0 { 1.0 } else { -1.0 };
             let gains = -distance.signum() * self.way;
             let picture = self.scene.texture * (1.0 - self.scene.flicker) * stripe * gains;
             let polarity = Polarity::from_on(chance < f64::midpoint(1.0, flicker + picture));
