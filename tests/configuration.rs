@@ -1,9 +1,10 @@
 //! The configuration: the files that come with evfocus are good, and what is wrong with others is said.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use evfocus_core::Prefer;
-use evfocus_core::controller::Pace;
+use evfocus_core::controller::{Pace, WatchConfig};
 use evfocusd::Config;
 
 fn folder() -> PathBuf {
@@ -149,7 +150,11 @@ fn mistakes_are_named_with_key_value_and_remedy() {
     refused("[simulation]\nfocus_counts = 99999", &["line 2", "simulation.focus_counts", "99999", "3750"]);
     refused("[[simulation.faults]]\nkind = \"gremlin\"\nafter_ms = 1", &["gremlin", "lens-stalled"]);
     refused("[[simulation.faults]]\nkind = \"lens-stalled\"", &["lens-stalled", "after_ms"]);
-    refused("[daemon]\nmode = \"continuous\"", &["daemon.mode", "continuous", "manual"]);
+    refused("[daemon]\nmode = \"continual\"", &["daemon.mode", "continual", "manual", "continuous"]);
+    refused("[continuous]\nrefocus_below = 1.0", &["line 2", "continuous.refocus_below", "1", "0.95"]);
+    refused("[continuous]\npatience_s = 0", &["line 2", "continuous.patience_s", "0.1"]);
+    refused("[continuous]\nrest_s = 90\n", &["continuous.longest_rest_s", "60", "90"]);
+    refused("[continuous]\npatience = 1", &["line 2", "patience"]);
     refused("[daemon]\nreports_kept = 0", &["daemon.reports_kept", "0", "1"]);
     refused("[daemon\n", &["line 1"]);
     refused("[serial]\nport = 1", &["serial"]);
@@ -228,12 +233,16 @@ fn mistakes_about_lens_drivers_are_named() {
 
 #[test]
 fn the_keys_of_a_run_reach_the_controller() {
-    let text = "[focus]\nspeed = \"fast\"\nprefer = \"nearest\"\nnearest_at = \"min\"\ndepth_of_focus_counts = 50\nextend_range = 0";
+    let text = "[focus]\nspeed = \"fast\"\nprefer = \"nearest\"\nnearest_at = \"min\"\ndepth_of_focus_counts = 50\nextend_range = 0\n\
+                [continuous]\nrefocus_below = 0.5\nlongest_rest_s = 600";
     let config = Config::parse(text, Path::new("rig.toml")).unwrap();
     let rig = evfocusd::VirtualRig::new(&config).unwrap();
     let controller = rig.controller().config();
     assert_eq!((controller.pace, controller.prefer), (Pace::Fast, Prefer::Nearest));
     assert!(!controller.nearest_is_high);
+    let expected =
+        WatchConfig { refocus_below: 0.5, longest_rest: Duration::from_secs(600), ..WatchConfig::default() };
+    assert_eq!(controller.watch, expected);
     assert!((controller.depth_of_focus - 50.0).abs() + controller.extension < 1e-9);
 }
 

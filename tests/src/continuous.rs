@@ -13,9 +13,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
 /// When the scene changes: the first run takes 4 to 6 s, and 2 s later it is known how the picture looks in focus.
-pub const CHANGES_AT: Duration = Duration::from_secs(11);
+pub const CHANGES_AT: Duration = Duration::from_secs(10);
 /// How long a loss of focus has to be noticed.
-pub const NOTICED_WITHIN: Duration = Duration::from_secs(8);
+pub const NOTICED_WITHIN: Duration = Duration::from_secs(6);
 /// What a run takes.
 const LONGEST_RUN: Duration = Duration::from_secs(15);
 const SCENES: [&str; 7] =

@@ -28,7 +28,7 @@ const EVERY: Duration = Duration::from_millis(20);
 /// Likeness at short distance, in standard deviations of what chance makes, from which it can be read.
 const SIGNIFICANT: f64 = 12.0;
 /// Pictures that a reading takes at least, so that it does not hang on a moment.
-const FEWEST_PICTURES: u32 = 8;
+const FEWEST_PICTURES: u32 = 16;
 /// Pictures that have not come to a reading by then say nothing.
 const MOST_PICTURES: u32 = 200;
 
@@ -173,8 +173,6 @@ impl SharpnessMeter {
 
 #[cfg(test)]
 mod tests {
-    use std::vec::Vec;
-
     use super::*;
     use crate::event::Polarity;
 
