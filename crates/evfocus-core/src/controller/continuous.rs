@@ -143,16 +143,13 @@ impl Controller {
         if is_known && !is_lost || !self.continuous.watcher.may_run(now) {
             return;
         }
-        match self.start(self.continuous.request, now, actions) {
-            Ok(run) => {
-                self.continuous.own_run = Some(run);
-                self.continuous.runs += 1;
-            }
-            Err(_) => {
-                // The settings have changed, and the request does not suit them any more.
-                self.continuous.request = FocusRequest::default();
-                self.continuous.watcher.run_ended(false, now);
-            }
+        if let Ok(run) = self.start(self.continuous.request, now, actions) {
+            self.continuous.own_run = Some(run);
+            self.continuous.runs += 1;
+        } else {
+            // The settings have changed, and the request does not suit them any more.
+            self.continuous.request = FocusRequest::default();
+            self.continuous.watcher.run_ended(false, now);
         }
     }
 

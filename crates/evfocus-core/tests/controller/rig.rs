@@ -258,7 +258,7 @@ impl Rig {
             let chance = self.random.uniform();
             let place = self.random.next();
             let (x, y) = (place as u16 % GEOMETRY.width, (place >> 16) as u16 % GEOMETRY.height);
-            let stripe = if x / self.scene.stripe % 2 == 0 { 1.0 } else { -1.0 };
+            let stripe = if (x / self.scene.stripe).is_multiple_of(2) { 1.0 } else { -1.0 };
             let gains = -distance.signum() * self.way;
             let picture = self.scene.texture * (1.0 - self.scene.flicker) * stripe * gains;
             let polarity = Polarity::from_on(chance < f64::midpoint(1.0, flicker + picture));
