@@ -8,7 +8,7 @@ mod fake;
 use std::time::Duration;
 
 use evfocus_ipc::client::ClientError;
-use evfocus_ipc::{Error, FocusRequest, Mode, State, Status};
+use evfocus_ipc::{Error, FocusRequest, Mode, PauseState, PauseWhen, State, Status};
 use fake::{BACKLOG, RANGE, Rig, limits};
 use tokio::time::Instant;
 
@@ -93,6 +93,15 @@ async fn refusals_are_typed() {
     assert_eq!(client.status().await.unwrap().mode, Mode::Manual);
     let refused = rig.client().await.focus_and_wait(&FocusRequest::default()).await.unwrap_err();
     assert!(matches!(refused, ClientError::Refused(Error::WrongMode { .. })), "{refused}");
+    client.set_mode(Mode::Continuous).await.unwrap();
+    for (when, state) in
+        [(PauseWhen::Immediate, PauseState::Paused), (PauseWhen::Deferred, PauseState::Paused)]
+    {
+        client.pause(when).await.unwrap();
+        assert_eq!(client.status().await.unwrap().pause, state);
+        client.resume().await.unwrap();
+        assert_eq!(client.status().await.unwrap().pause, PauseState::Running);
+    }
     client.move_to(1000.0).await.unwrap();
     assert_eq!(client.devices().await.unwrap().len(), 1);
 }

@@ -1,5 +1,5 @@
 //! How often continuous mode rightly starts a run, and how often it does so without need, in virtual time, as Markdown:
-//! `cargo run --release -p evfocus-tests --bin continuous-mode -- [TRIALS_OF_EACH [FIRST_SEED]]`.
+//! `cargo run --release -p evfocus-tests --bin continuous-mode -- [TRIALS_OF_EACH [FIRST_SEED [PART_OF_A_TITLE]]]`.
 #![expect(clippy::print_stdout, reason = "the table is what this program is for")]
 
 use std::time::Duration;
@@ -23,16 +23,15 @@ const HAPPENINGS: [Happening; 11] = [
 
 fn main() -> Result<()> {
     let mut words = std::env::args().skip(1);
-    let mut number = |otherwise: u64| {
-        words
-            .next()
-            .map_or(Ok(otherwise), |word| word.parse().with_context(|| format!("{word:?} is no number")))
+    let number = |word: Option<String>, otherwise: u64| {
+        word.map_or(Ok(otherwise), |word| word.parse().with_context(|| format!("{word:?} is no number")))
     };
-    let (trials, first) = (number(8)?, number(1)?);
+    let (trials, first) = (number(words.next(), 8)?, number(words.next(), 1)?);
+    let part = words.next().unwrap_or_default();
     println!("{trials} trials of each, seeds {first} to {}.\n", first + trials - 1);
     println!("| what happens | began in focus | started a run | after | error then, counts | sharpness |");
     println!("| --- | --- | --- | --- | --- | --- |");
-    for happening in HAPPENINGS {
+    for happening in HAPPENINGS.into_iter().filter(|happening| happening.title().contains(&part)) {
         let mut ended = Vec::new();
         for seed in first..first + trials {
             let trial = Trial::draw(happening, seed)?;

@@ -30,7 +30,7 @@ pub struct Arguments {
 /// Let continuous mode start focus runs again
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Example:
+Examples:
   evfocus resume
 
 If focus is not known where the lens stands, a run starts at once.")]

@@ -310,6 +310,8 @@ fn without_a_daemon_the_commands_say_so() {
         &["report"],
         &["move", "1985"],
         &["mode", "auto"],
+        &["pause", "--deferred"],
+        &["resume"],
     ] {
         let mut arguments = command.to_vec();
         arguments.extend(["--socket", "/nowhere/socket"]);

@@ -88,6 +88,28 @@ impl Drop for Daemon {
 }
 
 #[test]
+fn continuous_mode_starts_runs_by_itself_unless_it_is_paused() {
+    let daemon = Daemon::start();
+    daemon.refuses(&["pause"], &["the mode is auto", "continuous"]);
+    let comes_to = |state: &str| {
+        let is_there = |status: &Value| status["state"] == state;
+        assert!((0..2_000).any(|_| is_there(&daemon.json(&["status", "--json"]))), "never {state}");
+    };
+    assert_eq!(daemon.json(&["mode", "continuous", "--json"])["mode"], "continuous");
+    comes_to("scanning");
+    assert_eq!(daemon.json(&["pause", "--json"])["continuous"], "paused");
+    comes_to("idle");
+    assert!(stdout(&daemon.run(&["status"])).contains("mode      continuous, paused"));
+    assert!(stdout(&daemon.run(&["resume"])).contains("continuous mode resumed"));
+    comes_to("scanning");
+    assert!(daemon.run(&["pause", "--deferred"]).status.success());
+    assert_eq!(daemon.json(&["status", "--json"])["pause"], "pausing");
+    assert_eq!(daemon.run(&["focus"]).status.code(), Some(0), "follows the run under way");
+    comes_to("focused");
+    assert_eq!(daemon.json(&["status", "--json"])["pause"], "paused");
+}
+
+#[test]
 fn a_session_with_the_daemon() {
     let daemon = Daemon::start();
     let status = daemon.json(&["status", "--json"]);

@@ -56,6 +56,8 @@ fn every_help_has_examples_and_those_with_quantities_name_units() {
         "watch",
         "move",
         "mode",
+        "pause",
+        "resume",
         "devices",
         "report",
         "analyze",
@@ -71,7 +73,7 @@ fn every_help_has_examples_and_those_with_quantities_name_units() {
             help.contains("Examples:") && help.contains(&format!("evfocus {command}")),
             "{command}: {help}"
         );
-        if !["abort", "mode", "devices", "completions"].contains(&command) {
+        if !["abort", "mode", "pause", "resume", "devices", "completions"].contains(&command) {
             assert!(
                 help.contains("Units:") && help.contains("counts") || command == "info",
                 "{command}: {help}"
