@@ -173,7 +173,7 @@ fn a_run_is_followed_to_its_report() {
 fn a_window_is_focused_on_and_the_answer_says_how_sure_it_is() {
     let daemon = Daemon::start();
     let focus = ["focus", "--from", "1500", "--to", "2500", "--speed", "fast", "--window", "25%,25%,50%,50%"];
-    let text = stdout(&daemon.run(&[&focus[..], &["--prefer", "0"]].concat()));
+    let text = stdout(&daemon.run(&[&focus[..], &["--prefer", "0", "--one-way"]].concat()));
     let report = daemon.json(&["report", "--json"]);
     let (request, result) = (&report["request"], &report["result"]);
     assert_eq!((&request["speed"], &request["directions"]), (&"fast".into(), &"forward".into()));
