@@ -3,7 +3,7 @@
 //! | thread | waits on | queue in | queue out | stopped by |
 //! | --- | --- | --- | --- | --- |
 //! | `evfocus-camera` | the camera, at most 10 ms | empty batches | filled batches | the stop flag |
-//! | `evfocus-control` | being woken, at most 2 ms | batches, samples, notices, commands | orders, snapshots, curve points, reports | the stop flag |
+//! | `evfocus-control` | being woken, at most 2 ms, 6 between runs | batches, samples, notices, commands | orders, snapshots, curve points, reports | the stop flag |
 //! | `evfocus-lens` | orders, until the next poll is due | orders | samples, notices | the end of the orders' queue |
 //!
 //! Every queue is bounded; orders are a slot in which the latest motion counts. The lens is stopped when its orders end, whatever ended them: a clean stop, an error, a panic.

@@ -21,8 +21,10 @@ use crate::handle::{Answer, Command};
 use crate::vitals::Vitals;
 use crate::wire;
 
-/// How long the thread sleeps unless somebody wakes it: commands wake nobody.
+/// How long the thread sleeps in a run unless somebody wakes it: time wakes nobody.
 const NAP: Duration = Duration::from_millis(2);
+/// The same between runs: nor do commands.
+const IDLE_NAP: Duration = Duration::from_millis(6);
 /// How often the state is published while nothing changes but numbers.
 const PUBLISH: Duration = Duration::from_millis(20);
 /// Actions one input can bring about, with room to spare.
@@ -127,7 +129,8 @@ impl ControlThread {
         let mut published = (HostMicros(i64::MIN), self.seen());
         let mut curve_sent = (RunId(0), 0);
         while !self.stop.is_stopped() {
-            std::thread::park_timeout(NAP);
+            let is_busy = self.controller.snapshot().run.is_some() || self.desk.is_calibrating();
+            std::thread::park_timeout(if is_busy { NAP } else { IDLE_NAP });
             self.vitals.waiting(self.filled.slots(), self.samples.slots());
             self.take_notices(&mut actions);
             self.take_samples(&mut actions);

@@ -82,6 +82,8 @@ pub fn command_latency(lens: Box<dyn Lens>, poll: Duration, count: usize) -> Vec
         let pause = 3000 + (index as u64 * 7919) % 17_000;
         clock.sleep_until(clock.now() + Duration::from_micros(pause));
         while taken.pop().is_ok() {}
+        // The thread itself stops the lens when it begins.
+        while arrived.try_recv().is_ok() {}
         let share = if index % 4 < 2 { 0.6 } else { 0.4 };
         let target = LensPosition(info.range.min().0 + share * info.range.length());
         let order = if index % 2 == 0 {
