@@ -43,6 +43,10 @@ const FIRMWARE_FX2: u8 = 4;
 /// The product number of the older boards, which speak the same protocol.
 const PRODUCT_FX2: u16 = 0x841B;
 
+/// Events that a camera may say it has dropped from one look to the next; more, minutes of its highest rate, is a broken counter, and must not
+/// spoil the sums.
+const MOST_DROPPED: u64 = u32::MAX as u64;
+
 /// An opened DAVIS346.
 pub struct Davis346<T: UsbTransport> {
     transport: T,
@@ -176,7 +180,7 @@ impl<T: UsbTransport> Camera for Davis346<T> {
             // Wraps that were counted without being sent: the camera may have dropped events meanwhile.
             self.seen_jumps = jumps;
             let dropped = self.dropped()?;
-            batch.lost += dropped.saturating_sub(self.seen_dropped);
+            batch.lost += dropped.saturating_sub(self.seen_dropped).min(MOST_DROPPED);
             self.seen_dropped = dropped;
         }
         Ok(())
