@@ -321,7 +321,7 @@ impl fmt::Display for Failure {
                 match suspicion {
                     Suspicion::Backlash { counts } => write!(
                         f,
-                        "the lens has play; set lens.backlash_counts to about {counts:.0}, or sweep one way only (speed fast)"
+                        "the lens has play; set lens.backlash_counts to about {counts:.0}, or sweep one way only (directions forward)"
                     ),
                     Suspicion::LatePositions => f.write_str("positions are reported too late; poll the lens faster"),
                     Suspicion::DifferentPeaks => f.write_str("the scene changed between the two; try again"),

@@ -21,8 +21,8 @@ pub struct FocusRequest {
     pub method: Option<String>,
     /// The positions to sweep, in counts.
     pub range: Option<LensRange>,
-    /// How thorough: `fast`, one sweep that ends beyond the peak; `normal`, the same and back over the peak; `accurate`, the whole
-    /// range both ways.
+    /// How thorough: `fast`, one sweep that ends beyond the peak, if that is sure enough; `normal`, and back over the peak;
+    /// `accurate`, the whole range both ways.
     #[serde(default)]
     pub speed: Option<String>,
     /// The speed of the sweep in counts per second.

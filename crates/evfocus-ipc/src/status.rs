@@ -177,7 +177,7 @@ pub struct Status {
     pub run_id: Option<u64>,
     /// Where the lens is, in its own counts; nothing before its first answer.
     pub lens_position: Option<f64>,
-    /// Whether the lens is moving.
+    /// Whether the lens is moving: from the order on, until it was asked since and stands.
     pub lens_moving: bool,
     /// The positions that the lens accepts, in counts.
     pub lens_range: Option<LensRange>,

@@ -58,13 +58,15 @@ fn differ_in_words(one: &Status, other: &Status) -> bool {
         events_lost: 0,
         event_rate: 0.0,
         uptime_s: 0.0,
+        sharpness: None,
         ..status.clone()
     };
     words(one) != words(other)
 }
 
 fn differ_in_quantities(one: &Status, other: &Status) -> bool {
-    (one.lens_position, one.events_lost) != (other.lens_position, other.events_lost)
+    let quantities = |status: &Status| (status.lens_position, status.events_lost, status.sharpness);
+    quantities(one) != quantities(other)
 }
 
 /// Follows run `run_id` until it is done; sends what comes before the end into `stream`, if there is one.
