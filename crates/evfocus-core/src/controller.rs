@@ -40,7 +40,7 @@ use crate::clock_map::{ClockEvent, ClockMap};
 use crate::delay::DelayModel;
 use crate::event::{EventBatch, Geometry};
 use crate::lens_trace::LensSample;
-use crate::report::{Failure, Outcome, Phase, RunId, RunReport};
+use crate::report::{Failure, FocusPlan, Outcome, Phase, RunId, RunReport};
 use crate::units::{EventRate, HostMicros, LensPosition};
 
 use continuous::Continuous;
@@ -258,18 +258,17 @@ impl Controller {
             let same = run.plan == plan || request == FocusRequest::default();
             return if same { Ok(Accepted::UnderWay(run.id)) } else { Err(Refusal::Busy { run: run.id }) };
         }
-        let run = self.start(request, now, actions)?;
+        let run = self.start(plan, now, actions)?;
         self.continuous.request = request;
         Ok(Accepted::Started(run))
     }
 
     fn start(
         &mut self,
-        request: FocusRequest,
+        plan: FocusPlan,
         now: HostMicros,
         actions: &mut Vec<Action>,
     ) -> Result<RunId, Refusal> {
-        let plan = request.resolve(&self.config, self.geometry)?;
         if !self.camera_ready {
             return Err(Refusal::NoCamera);
         }

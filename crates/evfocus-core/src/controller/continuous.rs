@@ -143,7 +143,8 @@ impl Controller {
         if is_known && !is_lost || !self.continuous.watcher.may_run(now) {
             return;
         }
-        if let Ok(run) = self.start(self.continuous.request, now, actions) {
+        let plan = self.continuous.request.resolve(&self.config, self.geometry);
+        if let Ok(run) = plan.and_then(|plan| self.start(plan, now, actions)) {
             self.continuous.own_run = Some(run);
             self.continuous.runs += 1;
         } else {

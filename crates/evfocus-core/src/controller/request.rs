@@ -57,10 +57,12 @@ impl Pace {
         }
     }
 
-    fn directions(self) -> Directions {
-        match self {
-            Self::Fast => Directions::BackIfUnsure,
-            Self::Normal | Self::Accurate => Directions::Both,
+    fn directions(self, method: Method) -> Directions {
+        match (self, method) {
+            (Self::Fast, Method::Structure | Method::Auto) => Directions::BackIfUnsure,
+            // The others do not know how sure they are.
+            (Self::Fast, _) => Directions::Forward,
+            (Self::Normal | Self::Accurate, _) => Directions::Both,
         }
     }
 }
@@ -212,12 +214,13 @@ impl FocusRequest {
     pub fn resolve(&self, config: &ControllerConfig, geometry: Geometry) -> Result<FocusPlan, Refusal> {
         let pace = self.pace.unwrap_or(config.pace);
         let prefer = self.prefer.unwrap_or(config.prefer);
+        let method = self.method.unwrap_or(config.method);
         let plan = FocusPlan {
-            method: self.method.unwrap_or(config.method),
+            method,
             interval: self.interval.unwrap_or(config.interval),
             range: self.range.unwrap_or(config.limits),
             speed: self.speed.unwrap_or(config.sweep_speed),
-            directions: self.directions.unwrap_or(pace.directions()),
+            directions: self.directions.unwrap_or(pace.directions(method)),
             // A nearer subject may come later than a stronger one.
             early_stop: pace != Pace::Accurate && prefer != Prefer::Nearest,
             windows: self.windows,

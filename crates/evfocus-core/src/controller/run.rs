@@ -200,17 +200,16 @@ impl Controller {
 
     /// Whether the way back may tell what the first sweep does not. Where focus lies beyond the range it cannot.
     fn is_unsure(&self) -> bool {
-        let Some(Run { plan, legs: [Some(first), _], delays, .. }) = &self.run else { return false };
+        let Some(Run { legs: [Some(first), _], delays, .. }) = &self.run else { return false };
         let knows_the_delay = delays.measurements > 0
             || first.structure.and_then(Result::ok).is_none_or(|said| said.noise_hz < LEAST_NOISE_HZ);
-        match (plan.method, self.judge()) {
-            (Method::Structure | Method::Auto, Ok(found)) => {
+        match self.judge() {
+            Ok(found) => {
                 let is_sure =
                     found.confidence.is_some_and(|confidence| confidence >= SURE) && knows_the_delay;
                 !is_sure && !found.flags.contains(Flag::Edge)
             }
-            (Method::Structure | Method::Auto, Err(failure)) => !failure.is_final(2),
-            _ => false,
+            Err(failure) => !failure.is_final(2),
         }
     }
 
