@@ -4,16 +4,17 @@
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use evfocus_core::{Event, HostMicros, LensSpeed, Method, Searcher, SweepCapacity, SweepRecorder};
+use evfocus_core::{
+    EventList, Events, HostMicros, LensSpeed, Method, Searcher, SweepCapacity, SweepRecorder,
+};
 use evfocus_eval::simulated_sweep::{SweepObserver, SweepPlan, Ways};
 use hil_sim::{LensConfig, LensKind, Rig, RigConfig, Scene};
 
-struct Collected(Vec<Event>);
+struct Collected(EventList);
 
 impl SweepObserver for Collected {
-    fn events(&mut self, events: &[Event]) -> Result<()> {
-        self.0.extend_from_slice(events);
-        Ok(())
+    fn events(&mut self, events: Events<'_>) -> Result<()> {
+        Ok(events.iter().try_for_each(|event| self.0.push(event))?)
     }
 
     fn passed(&mut self, _: HostMicros, _: &Rig) -> Result<()> {
@@ -27,12 +28,12 @@ fn raw_error(lens: LensConfig, ways: Ways) -> Result<f64> {
     let geometry = rig.sensor.geometry;
     let speed = LensSpeed::new(rig.lens.range.length() / 1.5)?;
     let plan = SweepPlan { rig, speed, ways, rest: Duration::ZERO };
-    let mut collected = Collected(Vec::new());
+    let mut collected = Collected(EventList::default());
     let made = plan.simulate(&mut collected)?;
     let capacity = SweepCapacity { events: collected.0.len(), ..SweepCapacity::default() };
     let mut recorder = SweepRecorder::new(geometry, capacity);
     recorder.start(collected.0.first().context("no events")?.t);
-    recorder.feed(&collected.0);
+    recorder.feed(collected.0.as_slice());
     let sweep = recorder.sweep(&made.trace).context("no sweep")?;
     let said = Searcher::new(geometry).search(Method::Structure, &sweep, Duration::ZERO)?;
     let truth = made.rig.truth();

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use evfocus_core::search::{ApexFinder, Bookings};
 use evfocus_core::{
-    Analyzer, Answer, CameraMicros, Event, Failure, Flag, LegReport, LensPosition, LensRange, Method,
-    Polarity, Question, Rules, SearchError, Searcher, SweepCapacity, SweepLimits, SweepQuality,
+    Analyzer, Answer, CameraMicros, Event, EventList, Failure, Flag, LegReport, LensPosition, LensRange,
+    Method, Polarity, Question, Rules, SearchError, Searcher, SweepCapacity, SweepLimits, SweepQuality,
     SweepRecorder, answer,
 };
 use evfocus_tests::recorded_sweeps::{RecordedSweep, Reference, committed};
@@ -133,7 +133,9 @@ fn with_events(sweep: &RecordedSweep, events: &[Event]) -> SweepRecorder {
     let capacity = SweepCapacity { events: events.len(), ..SweepCapacity::default() };
     let mut recorder = SweepRecorder::new(sweep.geometry, capacity);
     recorder.start(events.first().map_or_else(Default::default, |event| event.t));
-    recorder.feed(events);
+    let mut list = EventList::with_capacity(events.len());
+    assert_eq!(list.append(events.iter().copied()), 0, "a sweep takes no days");
+    recorder.feed(list.as_slice());
     recorder
 }
 

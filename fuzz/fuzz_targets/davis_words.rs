@@ -16,7 +16,7 @@ fuzz_target!(|data: &[u8]| {
     }
     assert_eq!(counted, batch.events.len() as u64 + batch.lost);
     assert_eq!(counter.reached(), batch.reached);
-    assert!(batch.events.is_sorted_by_key(|event| event.t));
+    assert!(batch.events.iter().is_sorted_by_key(|event| event.t));
     let sensor = DavisWordDecoder::GEOMETRY;
     assert!(batch.events.iter().all(|event| sensor.contains(event.x, event.y)));
 });

@@ -20,7 +20,7 @@ fuzz_target!(|data: &[u8]| {
     let dropped = decoder.damage().dropped_by_camera;
     assert_eq!(counted, batch.events.len() as u64 + batch.lost - dropped);
     assert_eq!(counter.reached(), batch.reached);
-    assert!(batch.events.is_sorted_by_key(|event| event.t));
+    assert!(batch.events.iter().is_sorted_by_key(|event| event.t));
     assert!(batch.events.iter().all(|event| SENSOR.contains(event.x, event.y)));
     assert!(batch.events.len() <= bytes.len() * Evt3Decoder::MAX_EVENTS_PER_BYTE);
 });

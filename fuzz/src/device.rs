@@ -161,7 +161,7 @@ pub fn use_it(mut camera: impl Camera) {
                 break;
             }
             assert_eq!(batch.events.capacity(), room, "the batch grew");
-            for event in &batch.events {
+            for event in batch.events.iter() {
                 assert!(event.t.0 >= last, "time went back");
                 assert!(geometry.contains(event.x, event.y));
                 last = event.t.0;

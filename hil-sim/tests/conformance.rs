@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_core::{CameraMicros, EventBatch, HostMicros, LensPosition, LensSample, LensSpeed};
+use evfocus_core::{CameraMicros, Event, EventBatch, HostMicros, LensPosition, LensSample, LensSpeed};
 use evfocus_hal::{
     Camera, CameraInfo, Clock, DeviceError, DeviceErrorKind, Lens, LensInfo, VirtualClock, conformance,
 };
@@ -101,15 +101,22 @@ impl Camera for BadCamera {
         self.inner.read(batch, timeout)?;
         match self.vice {
             CameraVice::KeepsTheBatch => {
-                batch.events.splice(0..0, before);
+                let read = batch.events.to_vec();
+                batch.events.clear();
+                batch.events.append(before.iter().chain(read));
             }
             CameraVice::OverstaysTheTimeout => {
                 self.clock.sleep_until(self.clock.now() + Duration::from_secs(1));
             }
-            CameraVice::TimesGoBack => batch.events.reverse(),
+            CameraVice::TimesGoBack => {
+                let read = batch.events.to_vec();
+                batch.events.clear();
+                batch.events.append(read.into_iter().rev());
+            }
             CameraVice::PixelOffTheSensor => {
-                if let Some(event) = batch.events.last_mut() {
-                    event.x = 160;
+                if let Some(event) = batch.events.last() {
+                    batch.events.truncate(batch.events.len() - 1);
+                    batch.events.append([Event { x: 160, ..event }]);
                 }
             }
             CameraVice::GrowsTheBatch => batch.events.reserve(100_000),

@@ -52,7 +52,7 @@ fn drain(camera: &mut dyn Camera, batch: &mut EventBatch, events: &mut Vec<Event
         if batch.events.is_empty() {
             return;
         }
-        events.extend_from_slice(&batch.events);
+        events.extend(batch.events.iter());
     }
 }
 
@@ -60,7 +60,7 @@ fn patiently(camera: &mut dyn Camera, clock: &VirtualClock, until: HostMicros, e
     let mut batch = EventBatch::with_capacity(10_000);
     while clock.now() < until {
         camera.read(&mut batch, until.since(clock.now())).unwrap();
-        events.extend_from_slice(&batch.events);
+        events.extend(batch.events.iter());
     }
 }
 

@@ -147,7 +147,7 @@ pub(crate) fn watch(camera: &mut dyn Camera, clock: &dyn Clock, duration: Durati
     let (mut events, mut lost) = (Vec::new(), 0);
     while clock.now() < end {
         camera.read(&mut batch, end.since(clock.now())).unwrap();
-        events.extend_from_slice(&batch.events);
+        events.extend(batch.events.iter());
         lost += batch.lost;
     }
     (events, lost)

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use evfocus_core::{
-    CameraMicros, Event, EventBatch, Geometry, LensPosition, LensTrace, SweepCapacity, SweepRecorder,
+    CameraMicros, Event, EventBatch, EventList, Geometry, LensPosition, LensTrace, SweepCapacity,
+    SweepRecorder,
 };
 use evfocus_record::{MAX_EVENTS_PER_READ, Recording, positions};
 
@@ -42,7 +43,7 @@ impl RecordedSweep {
         let mut events = Vec::new();
         let mut batch = EventBatch::with_capacity(MAX_EVENTS_PER_READ);
         while recording.read(&mut batch)? {
-            events.extend_from_slice(&batch.events);
+            events.extend(batch.events.iter());
         }
         let trace = positions::read(folder.join(format!("{name}.positions.csv")))?;
         let truth = folder.join(format!("{name}.truth.json"));
@@ -96,7 +97,9 @@ impl RecordedSweep {
         if let Some(first) = events.first() {
             recorder.start(first.t);
         }
-        recorder.feed(events);
+        let mut list = EventList::with_capacity(events.len());
+        assert_eq!(list.append(events.iter().copied()), 0, "a sweep takes no days");
+        recorder.feed(list.as_slice());
         recorder
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use evfocus_core::decode::{DavisWordDecoder, Evt3Decoder};
-use evfocus_core::{Event, EventBatch, HostMicros};
+use evfocus_core::{EventBatch, HostMicros};
 use evfocus_hal::usb::{StreamQueue, UsbError, UsbTransport};
 use evfocus_hal::{Clock, DeviceError, DeviceErrorKind};
 
@@ -199,7 +199,7 @@ impl<D: Decode> Stream<D> {
         self.move_spill(batch);
         while self.spill.events.is_empty() {
             let rest = received.get(self.taken..).unwrap_or_default();
-            let room = batch.events.capacity() - batch.events.len();
+            let room = batch.events.room();
             let fits = room / D::MAX_EVENTS_PER_WORD * 2;
             if rest.is_empty() || (fits == 0 && !batch.events.is_empty()) {
                 return;
@@ -219,10 +219,8 @@ impl<D: Decode> Stream<D> {
     }
 
     fn move_spill(&mut self, batch: &mut EventBatch) {
-        let room = batch.events.capacity() - batch.events.len();
-        let count = self.spill.events.len().min(room);
-        let moved: std::vec::Drain<'_, Event> = self.spill.events.drain(..count);
-        batch.events.extend(moved);
+        let room = batch.events.room();
+        batch.lost += batch.events.append(self.spill.events.drain_front(room));
     }
 
     /// Queues the transfers anew after a stall.

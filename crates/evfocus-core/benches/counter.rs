@@ -15,12 +15,12 @@ fn counting(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("count");
     group.throughput(Throughput::Elements(sweep::BATCH as u64)).sample_size(20);
     for (name, length_us) in [("25 M/s", 40_000), ("2.5 M/s", 400_000)] {
-        let batch = sweep::batch(0, length_us);
+        let batch = sweep::list(&sweep::batch(0, length_us));
         let mut counter = CumulativeCounter::new(CumulativeCounter::DEFAULT_BIN, Duration::from_secs(20));
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 counter.start(CameraMicros(0));
-                counter.count(black_box(&batch));
+                counter.count(black_box(&batch).as_slice());
             });
         });
     }

@@ -12,8 +12,8 @@ use std::time::Instant;
 
 use evfocus_core::search::Travel;
 use evfocus_core::{
-    Analyzer, CameraMicros, CumulativeCounter, Event, Geometry, LegReport, Method, Question, Searcher,
-    SharpnessMeter, SweepCapacity, SweepLimits, SweepRecorder,
+    Analyzer, CameraMicros, CumulativeCounter, Event, Events, Geometry, LegReport, Method, Question,
+    Searcher, SharpnessMeter, SweepCapacity, SweepLimits, SweepRecorder,
 };
 
 #[path = "support/sweep.rs"]
@@ -41,7 +41,7 @@ const BATCHES: usize = 100;
 /// Nanoseconds an event that `work` spends on 100 million events, as a hundred batches that follow one another in time; only the work
 /// is measured, not the making of events. For each batch the shortest of all repeats counts: on a busy machine no repeat goes
 /// through from begin to end undisturbed, but each batch, a millisecond, does at some time.
-fn ns_per_event(length_us: i64, begin: impl FnMut(), work: impl FnMut(&[Event])) -> f64 {
+fn ns_per_event(length_us: i64, begin: impl FnMut(), work: impl FnMut(Events<'_>)) -> f64 {
     ns_per_event_at(sweep::GEOMETRY, length_us, begin, work)
 }
 
@@ -50,7 +50,7 @@ fn ns_per_event_at(
     geometry: Geometry,
     length_us: i64,
     mut begin: impl FnMut(),
-    mut work: impl FnMut(&[Event]),
+    mut work: impl FnMut(Events<'_>),
 ) -> f64 {
     let mut batch = sweep::batch(0, length_us);
     for event in &mut batch {
@@ -61,8 +61,9 @@ fn ns_per_event_at(
     for _ in 0..REPEATS {
         begin();
         for shortest in &mut shortest {
+            let list = sweep::list(&batch);
             let since = Instant::now();
-            work(black_box(&batch));
+            work(black_box(&list).as_slice());
             *shortest = since.elapsed().min(*shortest);
             sweep::delay(&mut batch, length_us);
         }
@@ -112,7 +113,7 @@ fn structure_of<const N: usize>(sweeps: [&[Event]; N]) -> Result<[f64; N], Box<d
         let mut recorder =
             SweepRecorder::new(SMALL, SweepCapacity { events: events.len(), ..SweepCapacity::default() });
         recorder.start(CameraMicros(0));
-        recorder.feed(events);
+        recorder.feed(sweep::list(events).as_slice());
         recorder
     });
     let trace = sweep::trace();
@@ -170,7 +171,7 @@ fn auto() -> Result<Auto, Box<dyn Error>> {
         recorder.start(CameraMicros(0));
         analyzer.begin(Travel::new(from, to)?);
         for (batch, shortest) in events.chunks(events.len().div_ceil(BATCHES)).zip(&mut live) {
-            recorder.feed(batch);
+            recorder.feed(sweep::list(batch).as_slice());
             let begin = Instant::now();
             analyzer.take(&recorder, &trace);
             *shortest = begin.elapsed().min(*shortest);
@@ -214,8 +215,8 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         let begin = || counter.borrow_mut().start(CameraMicros(0));
         let figure = ns_per_event(length_us, begin, |batch| {
             let mut counter = counter.borrow_mut();
-            for events in batch.chunks(size) {
-                counter.count(events);
+            for from in (0..batch.len()).step_by(size) {
+                counter.count(batch.range(from..from + size));
             }
         });
         assert_eq!(counter.borrow().totals().0 + counter.borrow().totals().1, 100_000_000);
@@ -230,8 +231,8 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
             length_us,
             || meter.borrow_mut().restart(),
             |batch| {
-                for events in batch.chunks(512) {
-                    black_box(meter.borrow_mut().take(events));
+                for from in (0..batch.len()).step_by(512) {
+                    black_box(meter.borrow_mut().take(batch.range(from..from + 512)));
                 }
             },
         );

@@ -2,7 +2,8 @@
 
 use core::time::Duration;
 
-use crate::event::{Event, Geometry, Window};
+use crate::event::{Geometry, Window};
+use crate::event_list::Events;
 use crate::lens_trace::LensTrace;
 use crate::quality::SweepQuality;
 use crate::report::{Failure, LegReport};
@@ -80,7 +81,7 @@ impl Analyzer {
     }
 
     /// Takes events made while the lens rests.
-    pub fn observe_rest(&mut self, events: &[Event]) {
+    pub fn observe_rest(&mut self, events: Events<'_>) {
         self.searcher.structure().observe_rest(events);
     }
 

@@ -387,7 +387,7 @@ impl Controller {
         self.camera_heard = now;
         let clock_event = self.clock.observe(reached, batch.arrival);
         match self.state {
-            State::Resting { .. } => self.sweep.observe_rest(&batch.events),
+            State::Resting { .. } => self.sweep.observe_rest(batch.events.as_slice()),
             State::Sweeping { .. } | State::Draining { .. } => {
                 if clock_event == ClockEvent::Reset {
                     self.fail(Failure::ClockUnusable, now, actions);
@@ -396,7 +396,7 @@ impl Controller {
                     self.sweep.extend_live_curve(reached);
                 }
             }
-            State::Idle => self.watch_events(&batch.events, now),
+            State::Idle => self.watch_events(batch.events.as_slice(), now),
             State::Moving(_)
             | State::Homing { .. }
             | State::ToStart(_)

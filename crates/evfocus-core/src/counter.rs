@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::ops::Sub;
 use core::time::Duration;
 
-use crate::event::Event;
+use crate::event_list::{Events, Run};
 use crate::units::CameraMicros;
 
 /// Numbers of events, fractional where an interval ends inside of a bin.
@@ -40,48 +40,6 @@ pub(crate) struct BinTotals {
     pub(crate) until: u64,
     /// The share of the bin that lies before the time asked for.
     pub(crate) inside: f64,
-}
-
-/// Events at the front of a batch that belong to one bin.
-#[derive(Debug, Clone, Copy, Default)]
-struct Run {
-    events: usize,
-    on: u64,
-    late: u64,
-}
-
-impl Run {
-    /// The run at the front of `events` that ends where an event is at or after `end_us`. Events before `start_us` are late.
-    fn of(events: &[Event], start_us: i64, end_us: i64) -> Self {
-        let mut run = Self::default();
-        // Eight at a time without a branch among them: polarities are as good as random, and guessing them wrong would cost more
-        // than everything else.
-        for eight in events.chunks_exact(8) {
-            let (mut beyond, mut on, mut late) = (false, 0, 0);
-            for event in eight {
-                beyond |= event.t.0 >= end_us;
-                on += event.polarity as u64;
-                late += u64::from(event.t.0 < start_us);
-            }
-            if beyond {
-                break;
-            }
-            run = Self { events: run.events + 8, on: run.on + on, late: run.late + late };
-        }
-        for event in events.get(run.events..).unwrap_or_default() {
-            if event.t.0 >= end_us {
-                break;
-            }
-            run.events += 1;
-            run.on += event.polarity as u64;
-            run.late += u64::from(event.t.0 < start_us);
-        }
-        // At the very end of time the bin's end cannot be written down; the event that reached the bin belongs to it all the same.
-        if let (0, Some(first)) = (run.events, events.first()) {
-            run = Self { events: 1, on: first.polarity as u64, late: 0 };
-        }
-        run
-    }
 }
 
 /// A question that the counter cannot answer.
@@ -176,21 +134,23 @@ impl CumulativeCounter {
 
     /// Counts `events`, whose times must not decrease. An event that is earlier than the newest bin is counted there, so that
     /// totals stay exact, and in [`late`](Self::late). The first event starts a counter that was not started.
-    pub fn count(&mut self, events: &[Event]) {
-        let Some(first) = events.first() else { return };
-        if !self.started {
-            self.start(first.t);
-        }
+    pub fn count(&mut self, events: Events<'_>) {
         let mut rest = events;
         while let Some(first) = rest.first() {
+            if !self.started {
+                self.start(first.t);
+            }
             if first.t.0 >= self.newest_end_us {
                 self.advance_to(first.t);
             }
-            let run = Run::of(rest, self.newest_start_us, self.newest_end_us);
+            let run = rest.run_until(CameraMicros(self.newest_start_us), CameraMicros(self.newest_end_us));
+            // At the very end of time the bin's end cannot be written down; the event that reached the bin belongs to it all the same.
+            let run =
+                if run.events == 0 { Run { events: 1, on: first.polarity as u64, late: 0 } } else { run };
             self.totals[0] += run.events as u64 - run.on;
             self.totals[1] += run.on;
             self.late += run.late;
-            rest = rest.get(run.events..).unwrap_or_default();
+            rest = rest.from(run.events);
         }
         self.close_newest();
     }

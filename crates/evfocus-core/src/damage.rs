@@ -9,6 +9,8 @@ pub struct Damage {
     pub events_before_address: u64,
     /// Events with a coordinate that the sensor does not have.
     pub outside_sensor: u64,
+    /// Events too far in time from the first of their batch to be kept with it; no sound stream has any.
+    pub too_far_in_time: u64,
     /// Events that the camera says it dropped because there were too many.
     pub dropped_by_camera: u64,
     /// Steps of the camera's time that are neither 0 nor 1 of its coarse unit: data was lost there.
@@ -27,11 +29,12 @@ pub struct Damage {
 
 impl Damage {
     /// All counters with their names, in the order of the fields.
-    pub fn counters(&self) -> [(&'static str, u64); 10] {
+    pub fn counters(&self) -> [(&'static str, u64); 11] {
         [
             ("events_before_time", self.events_before_time),
             ("events_before_address", self.events_before_address),
             ("outside_sensor", self.outside_sensor),
+            ("too_far_in_time", self.too_far_in_time),
             ("dropped_by_camera", self.dropped_by_camera),
             ("time_jumps", self.time_jumps),
             ("time_reversals", self.time_reversals),

@@ -1,7 +1,6 @@
 //! Events as decoders hand them over.
 
-use alloc::vec::Vec;
-
+use crate::event_list::EventList;
 use crate::units::{CameraMicros, HostMicros};
 
 /// The sign of a brightness change.
@@ -100,7 +99,7 @@ impl Window {
 #[derive(Debug, Clone, Default)]
 pub struct EventBatch {
     /// In the order of their times, as the camera sent them.
-    pub events: Vec<Event>,
+    pub events: EventList,
     /// When the transfer that held them arrived.
     pub arrival: HostMicros,
     /// The camera time up to which this batch is complete, known even when nothing happened (the camera's own time words);
@@ -113,7 +112,7 @@ pub struct EventBatch {
 impl EventBatch {
     /// An empty batch with room for `capacity` events.
     pub fn with_capacity(capacity: usize) -> Self {
-        Self { events: Vec::with_capacity(capacity), ..Self::default() }
+        Self { events: EventList::with_capacity(capacity), ..Self::default() }
     }
 
     /// Empties the batch and keeps its memory.

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use crate::event::{Event, Geometry};
+use crate::event_list::Events;
 
 /// A pixel that fires this often while the lens rests is hot, whatever the scene: shake makes tens of events a second.
 const HOT_RATE_HZ: f64 = 250.0;
@@ -44,9 +45,9 @@ impl HotPixels {
     }
 
     /// Counts the events of the rest.
-    pub fn observe(&mut self, events: &[Event]) {
-        for event in events {
-            if let Some(count) = self.place(event).and_then(|place| self.counts.get_mut(place)) {
+    pub fn observe(&mut self, events: Events<'_>) {
+        for event in events.iter() {
+            if let Some(count) = self.place(&event).and_then(|place| self.counts.get_mut(place)) {
                 *count = count.saturating_add(1);
             }
         }

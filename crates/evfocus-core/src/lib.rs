@@ -19,11 +19,13 @@ mod damage;
 pub mod decode;
 mod delay;
 mod event;
+mod event_list;
 mod event_store;
 mod flags;
 mod hot_pixels;
 mod lens_trace;
 mod measure;
+mod packed_event;
 mod quality;
 mod report;
 pub mod search;
@@ -43,11 +45,13 @@ pub use curve::{CurvePoint, FocusCurve};
 pub use damage::Damage;
 pub use delay::{Delay, DelayModel};
 pub use event::{Event, EventBatch, Geometry, Polarity, Window};
+pub use event_list::{EventList, Events};
 pub use event_store::EventStore;
 pub use flags::{Flag, Flags};
 pub use hot_pixels::HotPixels;
 pub use lens_trace::{Leg, LensSample, LensTrace, LensTraceError};
 pub use measure::{PixelCounts, event_rate};
+pub use packed_event::{DoesNotFit, LARGEST_ADDRESS};
 pub use quality::SweepQuality;
 pub use report::{
     Directions, Failure, FocusPlan, LegReport, Outcome, Phase, RunId, RunReport, Suspicion, Windows,

@@ -10,7 +10,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use crate::event::{Event, Geometry, Window};
+use crate::event::{Geometry, Window};
+use crate::event_list::Events;
 use crate::units::CameraMicros;
 
 /// Distances at which pixels are compared, along rows and columns: the fine ones and the one that stands for "far".
@@ -89,7 +90,7 @@ impl SharpnessMeter {
     }
 
     /// Takes events at a lens at rest; their times must not decrease. Returns the newest reading that they completed.
-    pub fn take(&mut self, events: &[Event]) -> Option<f64> {
+    pub fn take(&mut self, events: Events<'_>) -> Option<f64> {
         let mut reading = None;
         let mut rest = events;
         while let Some(first) = rest.first() {
@@ -97,15 +98,14 @@ impl SharpnessMeter {
                 let due = CameraMicros(self.began.0.saturating_add(EVERY.as_micros() as i64));
                 // A camera that started anew counts from zero again.
                 if first.t < due && first.t >= self.began {
-                    let wait = rest.partition_point(|event| event.t < due);
-                    rest = rest.get(wait.max(1)..).unwrap_or_default();
+                    rest = rest.from(rest.first_at_or_after(due).max(1));
                     continue;
                 }
                 self.began = first.t;
             }
             let used = self.fill(rest);
-            rest = rest.get(used..).unwrap_or_default();
-            let newest = events.get(events.len() - rest.len() - 1).map_or(self.began, |event| event.t);
+            rest = rest.from(used);
+            let newest = events.at(events.len() - rest.len() - 1).map_or(self.began, |event| event.t);
             if self.touched.len() >= self.enough {
                 reading = self.read().or(reading);
             } else if newest.0.saturating_sub(self.began.0) > LONGEST_PICTURE.as_micros() as i64 {
@@ -116,7 +116,7 @@ impl SharpnessMeter {
     }
 
     /// Puts events into the picture until it is complete. Returns how many it took, at least one.
-    fn fill(&mut self, events: &[Event]) -> usize {
+    fn fill(&mut self, events: Events<'_>) -> usize {
         for (index, event) in events.iter().enumerate() {
             let Some((x, y)) = self.window.place_of(event.x, event.y) else { continue };
             let place = usize::from(y) * self.stride + usize::from(x);
@@ -174,7 +174,8 @@ impl SharpnessMeter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::event::Polarity;
+    use crate::event::{Event, Polarity};
+    use crate::event_list::EventList;
 
     const GEOMETRY: Geometry = Geometry { width: 160, height: 120 };
 
@@ -198,8 +199,14 @@ mod tests {
         (0..rate).map(event).collect()
     }
 
+    fn take(meter: &mut SharpnessMeter, events: &[Event]) -> Option<f64> {
+        let mut list = EventList::default();
+        assert_eq!(list.append(events.iter().copied()), 0);
+        meter.take(list.as_slice())
+    }
+
     fn reading(rate: u64, stripe: u64, share: f64) -> Option<f64> {
-        SharpnessMeter::new(GEOMETRY).take(&events(rate, stripe, share))
+        take(&mut SharpnessMeter::new(GEOMETRY), &events(rate, stripe, share))
     }
 
     #[test]
@@ -220,7 +227,7 @@ mod tests {
         assert_eq!(reading(500, 3, 1.0), None);
         let light: Vec<_> =
             events(1_000_000, 3, 0.0).into_iter().map(|e| Event { polarity: Polarity::On, ..e }).collect();
-        assert_eq!(SharpnessMeter::new(GEOMETRY).take(&light), None);
+        assert_eq!(take(&mut SharpnessMeter::new(GEOMETRY), &light), None);
     }
 
     #[test]
@@ -234,8 +241,8 @@ mod tests {
     fn batches_of_any_size_read_alike_and_only_the_window_counts() {
         let all = events(1_000_000, 3, 0.9);
         let mut meter = SharpnessMeter::new(GEOMETRY);
-        let pieces: Vec<_> = all.chunks(97).filter_map(|piece| meter.take(piece)).collect();
-        assert_eq!(pieces.last().copied(), SharpnessMeter::new(GEOMETRY).take(&all));
+        let pieces: Vec<_> = all.chunks(97).filter_map(|piece| take(&mut meter, piece)).collect();
+        assert_eq!(pieces.last().copied(), take(&mut SharpnessMeter::new(GEOMETRY), &all));
         // Outside of the window the stripes are wide.
         let mut mixed = events(1_000_000, 9, 0.9);
         for (event, fine) in mixed.iter_mut().zip(&all) {
@@ -246,7 +253,7 @@ mod tests {
             }
         }
         meter.look_at(Window { x: 80, y: 0, width: 80, height: 120 });
-        let (window, whole) = (meter.take(&mixed), pieces.last());
+        let (window, whole) = (take(&mut meter, &mixed), pieces.last());
         let ratio = window.zip(whole).map(|(window, whole)| window / whole);
         assert!(ratio.is_some_and(|ratio| (ratio - 1.0).abs() < 0.1), "{window:?} {whole:?}");
     }
@@ -255,14 +262,12 @@ mod tests {
     fn a_camera_that_counts_anew_is_read_on() {
         let mut meter = SharpnessMeter::new(GEOMETRY);
         let late = |event: Event| Event { t: CameraMicros(event.t.0 + 1_000_000_000), ..event };
-        assert!(meter.take(&events(1_000_000, 3, 0.9).into_iter().map(late).collect::<Vec<_>>()).is_some());
-        assert!(meter.take(&events(1_000_000, 3, 0.9)).is_some());
+        let later: Vec<_> = events(1_000_000, 3, 0.9).into_iter().map(late).collect();
+        assert!(take(&mut meter, &later).is_some());
+        assert!(take(&mut meter, &events(1_000_000, 3, 0.9)).is_some());
         // Or has no time at all.
-        assert!(
-            meter
-                .take(&[Event { t: CameraMicros(i64::MAX), x: 500, y: 500, polarity: Polarity::On }])
-                .is_none()
-        );
-        meter.take(&[Event { t: CameraMicros(i64::MIN), x: 5, y: 5, polarity: Polarity::On }]);
+        let at = |t, x, y| [Event { t: CameraMicros(t), x, y, polarity: Polarity::On }];
+        assert!(take(&mut meter, &at(i64::MAX, 500, 500)).is_none());
+        take(&mut meter, &at(i64::MIN, 5, 5));
     }
 }

@@ -3,7 +3,8 @@
 use core::time::Duration;
 
 use crate::counter::{CounterError, CumulativeCounter};
-use crate::event::{Event, Geometry};
+use crate::event::Geometry;
+use crate::event_list::Events;
 use crate::event_store::EventStore;
 use crate::lens_trace::{LensTrace, LensTraceError};
 use crate::units::{CameraMicros, LensPosition};
@@ -52,18 +53,16 @@ impl SweepRecorder {
     /// Begins a new sweep at `origin`.
     pub fn start(&mut self, origin: CameraMicros) {
         self.counter.start(origin);
-        self.store.start(origin);
+        self.store.start();
         self.span = None;
     }
 
     /// Takes the events of a batch, in the order of their times.
-    pub fn feed(&mut self, events: &[Event]) {
+    pub fn feed(&mut self, events: Events<'_>) {
         let (Some(first), Some(last)) = (events.first(), events.last()) else { return };
         self.span = Some((self.span.map_or(first.t, |(start, _)| start), last.t));
         self.counter.count(events);
-        for event in events {
-            self.store.push(event);
-        }
+        self.store.append(events);
     }
 
     /// Notes that there are no further events before `time`.

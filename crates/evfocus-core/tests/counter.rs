@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use evfocus_core::{CameraMicros, CounterError, CumulativeCounter, Event, EventCounts, Polarity};
+use evfocus_core::{CameraMicros, CounterError, CumulativeCounter, Event, EventCounts, EventList, Polarity};
 use proptest::prelude::*;
 
 /// Events in the order of time: gaps and polarities, after an origin that may be microseconds since 1970.
@@ -28,10 +28,16 @@ fn naive(events: &[Event], from: i64, to: i64) -> EventCounts {
     counts
 }
 
+fn list(events: &[Event]) -> EventList {
+    let mut list = EventList::default();
+    assert_eq!(list.append(events.iter().copied()), 0);
+    list
+}
+
 fn counter_of(origin: i64, events: &[Event], bin: u64, horizon: u64) -> CumulativeCounter {
     let mut counter = CumulativeCounter::new(Duration::from_micros(bin), Duration::from_micros(horizon));
     counter.start(CameraMicros(origin));
-    counter.count(events);
+    counter.count(list(events).as_slice());
     counter
 }
 
@@ -95,7 +101,7 @@ proptest! {
         let whole = counter_of(origin, &events, 20, 1_000);
         let mut parts = counter_of(origin, &[], 20, 1_000);
         for batch in events.chunks(size) {
-            parts.count(batch);
+            parts.count(list(batch).as_slice());
         }
         let (from, to) = span(&whole, a, b);
         prop_assert_eq!(whole.count_between(from, to)?, parts.count_between(from, to)?);
@@ -136,7 +142,7 @@ proptest! {
     fn totals_are_exact_even_out_of_order(times in prop::collection::vec(any::<i64>(), 0..50)) {
         let mut counter = CumulativeCounter::new(Duration::from_micros(20), Duration::from_millis(1));
         for &t in &times {
-            counter.count(&[Event { t: CameraMicros(t), x: 0, y: 0, polarity: Polarity::On }]);
+            counter.count(list(&[on(t)]).as_slice());
         }
         prop_assert_eq!(counter.totals(), (times.len() as u64, 0));
     }
@@ -155,7 +161,7 @@ fn a_counter_never_started_has_no_numbers() {
 #[test]
 fn the_first_event_starts_a_counter_that_was_not_started() {
     let mut counter = CumulativeCounter::new(Duration::from_micros(20), Duration::from_millis(1));
-    counter.count(&[on(1_000), on(1_010)]);
+    counter.count(list(&[on(1_000), on(1_010)]).as_slice());
     assert_eq!(counter.oldest(), CameraMicros(1_000));
     assert_eq!(counter.count_between(1_000.0, 1_020.0).map(EventCounts::total), Ok(2.0));
 }
@@ -190,14 +196,14 @@ fn a_silence_longer_than_the_ring_leaves_empty_bins() {
     assert!(10_000_000.0 - oldest >= 1_000.0);
     assert_eq!(counter.count_between(oldest, 10_000_000.0).map(EventCounts::total), Ok(0.0));
     assert!(matches!(counter.count_between(0.0, 10_000_000.0), Err(CounterError::Overwritten { .. })));
-    counter.count(&[on(10_000_001)]);
+    counter.count(list(&[on(10_000_001)]).as_slice());
     assert_eq!(counter.count_between(oldest, 10_000_020.0).map(EventCounts::total), Ok(1.0));
 }
 
 #[test]
 fn late_events_are_counted_where_the_counter_stands_and_reported() {
     let mut counter = counter_of(0, &[on(0), on(105)], 20, 1_000);
-    counter.count(&[on(50), on(110)]);
+    counter.count(list(&[on(50), on(110)]).as_slice());
     assert_eq!(counter.late(), 1);
     assert_eq!(counter.totals(), (4, 0));
     assert_eq!(counter.count_between(40.0, 60.0).map(EventCounts::total), Ok(0.0));

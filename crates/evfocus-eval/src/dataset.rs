@@ -8,7 +8,7 @@ pub mod sweep_files;
 
 use std::path::PathBuf;
 
-use evfocus_core::{CameraMicros, Event, Geometry, LensTrace};
+use evfocus_core::{CameraMicros, EventList, Events, Geometry, LensTrace};
 use serde::{Deserialize, Serialize};
 
 use crate::cache::Cache;
@@ -118,7 +118,7 @@ pub struct Sequence {
     /// The sensor.
     pub geometry: Geometry,
     /// All events, in the order of their times.
-    pub events: Vec<Event>,
+    pub events: EventList,
     /// Where the lens was, in camera time.
     pub trace: LensTrace<CameraMicros>,
     /// Where the scene is sharp; several for several depths, each of which is right.
@@ -134,7 +134,7 @@ const TURN_SHARE: f64 = 0.05;
 #[derive(Debug)]
 pub struct Way<'a> {
     /// The events of this way.
-    pub events: &'a [Event],
+    pub events: Events<'a>,
     /// Lens positions, of this way alone.
     pub trace: LensTrace<CameraMicros>,
     /// First instant of the way.
@@ -152,7 +152,8 @@ impl Sequence {
         let mut ways = Vec::with_capacity(legs.len());
         for (index, leg) in legs.iter().enumerate() {
             let is_last = index + 1 == legs.len();
-            let (events, later) = rest.split_at(rest.partition_point(|event| is_last || event.t < leg.end));
+            let ends = if is_last { rest.len() } else { rest.first_at_or_after(leg.end) };
+            let (events, later) = (rest.range(0..ends), rest.from(ends));
             let mut trace = LensTrace::with_capacity(self.trace.len());
             for (time, position) in self.trace.samples() {
                 if time >= leg.start && time <= leg.end {

@@ -6,7 +6,7 @@
 //! is [`START_LEVEL`], the pictures have 8 bits, and nothing fades: noise adds up to the end of the sweep, as the paper's large errors for
 //! pictures from events suggest.
 
-use evfocus_core::{CameraMicros, Event, Geometry};
+use evfocus_core::{CameraMicros, Events, Geometry};
 
 use crate::GreyImage;
 
@@ -18,7 +18,7 @@ pub const CONTRAST: f64 = 0.2;
 pub const START_LEVEL: f64 = 0.3;
 
 /// Hands `see` the picture that `events` add up to, a hundred times a second from the first event to the last, with its time.
-pub fn pictures(geometry: Geometry, events: &[Event], mut see: impl FnMut(CameraMicros, &GreyImage)) {
+pub fn pictures(geometry: Geometry, events: Events<'_>, mut see: impl FnMut(CameraMicros, &GreyImage)) {
     let (Some(first), Some(last)) = (events.first(), events.last()) else { return };
     let period = 1_000_000 / PICTURES_PER_S;
     let mut counts = vec![0_i32; geometry.pixels()];
@@ -26,14 +26,14 @@ pub fn pictures(geometry: Geometry, events: &[Event], mut see: impl FnMut(Camera
     let mut due = CameraMicros(first.t.0.saturating_add(period));
     let mut rest = events;
     while due <= last.t {
-        let (before, after) = rest.split_at(rest.partition_point(|event| event.t < due));
+        let before = rest.range(0..rest.first_at_or_after(due));
         for event in before.iter().filter(|event| geometry.contains(event.x, event.y)) {
             let pixel = usize::from(event.y) * usize::from(geometry.width) + usize::from(event.x);
             counts[pixel] += if event.polarity.is_on() { 1 } else { -1 };
             picture.values_mut()[pixel] = level(counts[pixel]);
         }
         see(due, &picture);
-        rest = after;
+        rest = rest.from(before.len());
         due = CameraMicros(due.0 + period);
     }
 }
@@ -47,7 +47,7 @@ fn level(count: i32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use evfocus_core::Polarity;
+    use evfocus_core::{Event, EventList, Polarity};
 
     #[test]
     fn a_pixel_rises_by_a_threshold_an_event_and_stays() {
@@ -58,8 +58,9 @@ mod tests {
             event(15_000, Polarity::Off),
             event(30_000, Polarity::On),
         ];
+        let events = EventList::of(events).expect("they are close together");
         let mut seen = Vec::new();
-        pictures(Geometry { width: 2, height: 1 }, &events, |time, picture| {
+        pictures(Geometry { width: 2, height: 1 }, events.as_slice(), |time, picture| {
             seen.push((time.0, picture.values()[0], picture.values()[1]));
         });
         let times: Vec<i64> = seen.iter().map(|seen| seen.0).collect();

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_core::{CameraMicros, Event, EventBatch, HostMicros, LensPosition, LensSpeed, LensTrace};
+use evfocus_core::{CameraMicros, EventBatch, Events, HostMicros, LensPosition, LensSpeed, LensTrace};
 use evfocus_hal::{Camera, Clock, Lens, VirtualClock};
 use hil_sim::{LinkConfig, Rig, RigConfig, SimCamera, SimLens};
 
@@ -45,7 +45,7 @@ pub trait SweepObserver {
     ///
     /// # Errors
     /// Whatever ends the simulation.
-    fn events(&mut self, events: &[Event]) -> anyhow::Result<()>;
+    fn events(&mut self, events: Events<'_>) -> anyhow::Result<()>;
 
     /// The rig's time is `now`, a millisecond after the call before.
     ///
@@ -164,7 +164,7 @@ impl<'a, O: SweepObserver> Session<'a, O> {
             if self.batch.events.is_empty() {
                 return Ok(());
             }
-            self.observer.events(&self.batch.events)?;
+            self.observer.events(self.batch.events.as_slice())?;
             self.events += self.batch.events.len() as u64;
         }
     }

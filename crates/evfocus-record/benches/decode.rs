@@ -26,7 +26,7 @@ fn evt3(criterion: &mut Criterion) {
     let mut batch = EventBatch::with_capacity(MAX_EVENTS_PER_READ);
     let mut events = Vec::new();
     while recording.read(&mut batch).expect("the recording is sound") {
-        events.extend_from_slice(&batch.events);
+        events.extend(batch.events.iter());
     }
 
     let mut group = criterion.benchmark_group("evt3");

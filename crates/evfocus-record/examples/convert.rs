@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use evfocus_core::{Event, EventBatch};
+use evfocus_core::{EventBatch, Events};
 use evfocus_record::{
     Aedat4Compression, Aedat4Writer, CsvWriter, Evt3Writer, MAX_EVENTS_PER_READ, RecordError, Recording,
     Summary,
@@ -23,17 +23,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     match Path::new(output).extension().and_then(|extension| extension.to_str()) {
         Some("raw") => {
             let mut writer = Evt3Writer::create(output, geometry)?;
-            copy(recording, |events| writer.write(events))?;
+            copy(recording, |events| writer.write(events.iter()))?;
             writer.finish()?;
         }
         Some("aedat4") => {
             let mut writer = Aedat4Writer::create(output, geometry, Aedat4Compression::Lz4)?;
-            copy(recording, |events| writer.write(events))?;
+            copy(recording, |events| writer.write(events.iter()))?;
             writer.finish()?;
         }
         Some("csv") => {
             let mut writer = CsvWriter::create(output)?;
-            copy(recording, |events| writer.write(events))?;
+            copy(recording, |events| writer.write(events.iter()))?;
             writer.finish()?;
         }
         _ => return Err("the output must end in .raw, .aedat4 or .csv".into()),
@@ -43,11 +43,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn copy(
     mut recording: Recording,
-    mut write: impl FnMut(&[Event]) -> Result<(), RecordError>,
+    mut write: impl FnMut(Events<'_>) -> Result<(), RecordError>,
 ) -> Result<(), RecordError> {
     let mut batch = EventBatch::with_capacity(MAX_EVENTS_PER_READ);
     while recording.read(&mut batch)? {
-        write(&batch.events)?;
+        write(batch.events.as_slice())?;
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Writes Prophesee RAW files with EVT 3.0 words.
 
+use std::borrow::Borrow;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -43,10 +44,7 @@ impl Evt3Writer {
     /// # Errors
     /// [`RecordError::Encode`] for an event outside of the sensor, before the last one, or too long after it;
     /// [`RecordError::Write`] if the system refuses.
-    pub fn write(&mut self, events: &[Event]) -> Result<(), RecordError> {
-        if events.is_empty() {
-            return Ok(());
-        }
+    pub fn write(&mut self, events: impl IntoIterator<Item: Borrow<Event>>) -> Result<(), RecordError> {
         self.words.clear();
         let encoded = self.encoder.encode(events, &mut self.words);
         self.put_words()?;

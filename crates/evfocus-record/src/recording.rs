@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use evfocus_core::decode::{DavisWordDecoder, Evt3Decoder};
-use evfocus_core::{Damage, Event, EventBatch, Geometry};
+use evfocus_core::{Damage, EventBatch, Events, Geometry};
 
 use crate::aedat4::Aedat4Source;
 use crate::csv::CsvSource;
@@ -138,7 +138,7 @@ impl Recording {
             Source::Aedat4(source) => source.read(&self.path, batch)?,
             Source::Csv(source) => source.read(&self.path, batch)?,
         };
-        self.count_reversals(&batch.events);
+        self.count_reversals(batch.events.as_slice());
         Ok(more)
     }
 
@@ -160,8 +160,8 @@ impl Recording {
         }
     }
 
-    fn count_reversals(&mut self, events: &[Event]) {
-        for event in events {
+    fn count_reversals(&mut self, events: Events<'_>) {
+        for event in events.iter() {
             self.time_reversals += u64::from(event.t.0 < self.last_time);
             self.last_time = event.t.0;
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_core::{CameraMicros, Event, EventBatch, Geometry, HostMicros};
+use evfocus_core::{CameraMicros, EventBatch, EventList, Events, Geometry, HostMicros};
 use evfocus_hal::{Camera, CameraInfo, Clock, DeviceError, DeviceErrorKind};
 
 use crate::{MAX_EVENTS_PER_READ, RecordError, Recording, Summary};
@@ -142,8 +142,12 @@ impl Camera for ReplayCamera {
 /// A recording being played.
 struct Playing {
     recording: Recording,
-    /// What was read, with times that never fall.
+    /// What was read.
     fetched: EventBatch,
+    /// Those, with times that never fall.
+    timed: EventList,
+    /// Events that could not be kept, and nobody has been told of.
+    lost: u64,
     /// How many of those have been delivered.
     delivered: usize,
     /// Camera time and host time that belong together.
@@ -158,11 +162,21 @@ struct Playing {
 impl Playing {
     fn new(recording: Recording, started: HostMicros) -> Self {
         let fetched = EventBatch::with_capacity(MAX_EVENTS_PER_READ);
-        Self { recording, fetched, delivered: 0, origin: None, started, shift_us: 0, newest: None }
+        Self {
+            recording,
+            fetched,
+            timed: EventList::with_capacity(MAX_EVENTS_PER_READ),
+            lost: 0,
+            delivered: 0,
+            origin: None,
+            started,
+            shift_us: 0,
+            newest: None,
+        }
     }
 
-    fn pending(&self) -> &[Event] {
-        self.fetched.events.get(self.delivered..).unwrap_or_default()
+    fn pending(&self) -> Events<'_> {
+        self.timed.as_slice().from(self.delivered)
     }
 
     /// Reads on; `false` at the end of a recording that is not repeated.
@@ -183,7 +197,8 @@ impl Playing {
             }
         }
         let mut newest = self.newest;
-        for event in &mut self.fetched.events {
+        self.timed.clear();
+        for mut event in self.fetched.events.iter() {
             let recorded = event.t.0;
             if let Some((last, delivered)) = newest
                 && recorded < last.saturating_sub(DISORDER_US)
@@ -194,10 +209,11 @@ impl Playing {
             let time = newest.map_or(time, |(_, delivered)| time.max(delivered));
             newest = Some((recorded, time));
             event.t = CameraMicros(time);
+            self.lost += u64::from(self.timed.push(event).is_err());
         }
         self.newest = newest;
         if self.origin.is_none() {
-            self.origin = self.fetched.events.first().map(|event| (event.t, self.started));
+            self.origin = self.timed.first().map(|event| (event.t, self.started));
         }
         Ok(true)
     }
@@ -215,14 +231,15 @@ impl Playing {
 
     /// Moves the events up to `until` into `batch`, as far as there is room.
     fn deliver(&mut self, until: i64, batch: &mut EventBatch) {
-        let pending = self.fetched.events.get(self.delivered..).unwrap_or_default();
-        let due = pending.partition_point(|event| event.t.0 <= until);
-        let count = due.min(batch.events.capacity() - batch.events.len());
-        let (delivered, left) = pending.split_at(count);
-        batch.events.extend_from_slice(delivered);
-        self.delivered += count;
-        let is_complete = count == due && !left.is_empty() && until < i64::MAX;
+        let pending = self.pending();
+        let due = pending.first_at_or_after(CameraMicros(until.saturating_add(1)));
+        let count = due.min(batch.events.room());
+        let delivered = pending.range(0..count);
+        let is_complete = count == due && count < pending.len() && until < i64::MAX;
         let newest = delivered.last().map(|event| event.t);
+        batch.lost += batch.events.append(delivered.iter()) + self.lost;
+        self.lost = 0;
+        self.delivered += count;
         batch.reached = if is_complete { Some(CameraMicros(until)) } else { newest.or(batch.reached) };
     }
 }

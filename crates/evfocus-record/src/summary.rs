@@ -68,7 +68,7 @@ impl Summary {
         let mut batch = EventBatch::with_capacity(MAX_EVENTS_PER_READ);
         let mut tally = Tally::default();
         while recording.read(&mut batch)? {
-            batch.events.iter().for_each(|event| tally.add(event));
+            batch.events.iter().for_each(|event| tally.add(&event));
         }
         Ok(tally.summary(recording))
     }

@@ -11,7 +11,7 @@ use crate::READ_BYTES;
 /// A decoder of one of the kinds of words.
 #[derive(Debug)]
 pub(crate) enum WordDecoder {
-    Evt3(Evt3Decoder),
+    Evt3(Box<Evt3Decoder>),
     Evt2(Evt2Decoder),
     Davis(DavisWordDecoder),
 }
@@ -19,7 +19,7 @@ pub(crate) enum WordDecoder {
 impl WordDecoder {
     pub(crate) fn evt3(geometry: Option<Geometry>, origin_us: i64) -> Self {
         let geometry = geometry.unwrap_or(Evt3Decoder::MAX_GEOMETRY);
-        Self::Evt3(Evt3Decoder::with_origin(geometry, CameraMicros(origin_us)))
+        Self::Evt3(Box::new(Evt3Decoder::with_origin(geometry, CameraMicros(origin_us))))
     }
 
     pub(crate) fn evt2(geometry: Option<Geometry>, origin_us: i64) -> Self {

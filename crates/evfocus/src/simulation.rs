@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
-use evfocus_core::{Event, HostMicros, LensSpeed};
+use evfocus_core::{Events, HostMicros, LensSpeed};
 use evfocus_eval::simulated_sweep::{SweepObserver, SweepPlan, Ways};
 use evfocus_record::{Evt3Writer, positions};
 use hil_sim::{Rig, RigConfig};
@@ -63,8 +63,8 @@ struct Files {
 }
 
 impl SweepObserver for Files {
-    fn events(&mut self, events: &[Event]) -> anyhow::Result<()> {
-        Ok(self.recording.write(events)?)
+    fn events(&mut self, events: Events<'_>) -> anyhow::Result<()> {
+        Ok(self.recording.write(events.iter())?)
     }
 
     fn passed(&mut self, now: HostMicros, rig: &Rig) -> anyhow::Result<()> {

@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use evfocus_core::controller::DeviceFailure;
-use evfocus_core::{CameraMicros, ClockEvent, ClockMap, Event, EventBatch, HostMicros, LensSample};
+use evfocus_core::{CameraMicros, ClockEvent, ClockMap, EventBatch, Events, HostMicros, LensSample};
 use evfocus_hal::{Clock, SystemClock};
 use evfocus_record::RecordError;
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -304,8 +304,8 @@ impl Recorder {
                 let began = *self.began.get_or_insert(first);
                 self.recorded.seconds = reached.micros_since(began) as f64 * 1e-6;
             }
-            let unknown = self.unknown(&batch.events);
-            let events = batch.events.get(unknown..).unwrap_or_default();
+            let unknown = self.unknown(batch.events.as_slice());
+            let events = batch.events.as_slice().from(unknown);
             self.files.write(events)?;
             self.recorded.events += events.len() as u64;
             batch.clear();
@@ -318,14 +318,14 @@ impl Recorder {
     }
 
     /// How many of `events` came before the lens's first answer; of use to nobody in a recorded sweep.
-    fn unknown(&mut self, events: &[Event]) -> usize {
+    fn unknown(&mut self, events: Events<'_>) -> usize {
         if self.sweeper.is_none() {
             return 0;
         }
         let answered = self.waiting.first().and_then(|first| self.map.to_camera(first.time()).ok());
         let late = self.began.filter(|_| self.recorded.seconds > LONGEST_WAIT_FOR_THE_LENS_S);
         self.from = self.from.or(answered).or(late);
-        self.from.map_or(events.len(), |from| events.partition_point(|event| event.t < from))
+        self.from.map_or(events.len(), |from| events.first_at_or_after(from))
     }
 
     /// Takes the lens's answers, and writes those that came before `settled`.

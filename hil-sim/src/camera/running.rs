@@ -157,8 +157,8 @@ impl Running {
     pub(super) fn deliver(&mut self, batch: &mut EventBatch) {
         batch.arrival = self.arrived;
         let count = self.outbox.len().min(batch.events.capacity());
-        batch.events.extend(self.outbox.drain(..count));
-        batch.lost = std::mem::take(&mut self.lost);
+        let unfit = batch.events.append(self.outbox.drain(..count));
+        batch.lost = std::mem::take(&mut self.lost) + unfit;
         batch.reached = if self.outbox.is_empty() {
             Some(self.reached)
         } else {

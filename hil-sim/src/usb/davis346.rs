@@ -206,7 +206,7 @@ impl Device for Davis346 {
 
     fn send(&mut self, batch: &EventBatch) {
         let pixels_run = self.is_set(1, 3) && self.is_set(0, 3);
-        for event in &batch.events {
+        for event in batch.events.iter() {
             if event.t.0 < self.newest_us {
                 self.words.restart(event.t.0);
                 self.packet_sent_us = event.t.0;
@@ -215,10 +215,10 @@ impl Device for Davis346 {
             if pixels_run {
                 let registers = &self.registers;
                 let get = |parameter| registers.get(&(1, parameter)).copied().unwrap_or(0);
-                let passes = self.filters.pass(event, &get);
-                self.words.event(event, passes);
+                let passes = self.filters.pass(&event, &get);
+                self.words.event(&event, passes);
                 if passes {
-                    self.tallies.add(event, self.words.device_time(event.t.0));
+                    self.tallies.add(&event, self.words.device_time(event.t.0));
                 }
             }
         }

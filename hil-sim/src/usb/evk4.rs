@@ -200,13 +200,13 @@ impl Device for Evk4 {
     }
 
     fn send(&mut self, batch: &EventBatch) {
-        for event in &batch.events {
+        for event in batch.events.iter() {
             let registers = &self.registers;
             let get = |address| registers.get(&address).copied().unwrap_or(0);
             self.words.advance(event.t.0);
-            if self.filters.pass(event, &get) {
-                self.words.event(event);
-                self.tallies.add(event, self.words.told());
+            if self.filters.pass(&event, &get) {
+                self.words.event(&event);
+                self.tallies.add(&event, self.words.told());
             }
         }
         self.words.end_run();

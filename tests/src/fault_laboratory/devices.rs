@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use evfocus_core::{
-    CameraMicros, Event, EventBatch, HostMicros, LensPosition, LensRange, LensSample, LensSpeed, Polarity,
+    CameraMicros, Event, EventBatch, HostMicros, LARGEST_ADDRESS, LensPosition, LensRange, LensSample,
+    LensSpeed, Polarity,
 };
 use evfocus_hal::{Camera, CameraInfo, Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 use hil_sim::{SimCamera, SimLens};
@@ -133,29 +134,38 @@ impl FaultyCamera {
             CameraFault::Flood if self.flooded != now => {
                 self.flooded = now;
                 let t = batch.events.last().map_or(self.reached, |event| event.t);
-                let room = batch.events.capacity() - batch.events.len();
+                let room = batch.events.room();
                 let event = |index: usize| Event {
                     t,
                     x: (index % 48) as u16,
                     y: (index / 48 % 36) as u16,
                     polarity: Polarity::On,
                 };
-                batch.events.extend((0..room.min(20_000)).map(event));
+                batch.lost += batch.events.append((0..room.min(20_000)).map(event));
             }
             CameraFault::Lies => {
-                for (index, event) in batch.events.iter_mut().enumerate() {
-                    (event.x, event.y) = (event.x.wrapping_mul(1 + index as u16), u16::MAX - event.y);
-                }
+                let lies = |(index, event): (usize, Event)| Event {
+                    x: event.x.wrapping_mul(1 + index as u16) & LARGEST_ADDRESS,
+                    y: LARGEST_ADDRESS - event.y,
+                    ..event
+                };
+                replace(batch, |events| events.into_iter().enumerate().map(lies).collect());
             }
             CameraFault::ClockRuns => {
-                for event in &mut batch.events {
-                    event.t = CameraMicros(event.t.0 + event.t.0 / 10);
-                }
+                let runs = |event: Event| Event { t: CameraMicros(event.t.0 + event.t.0 / 10), ..event };
+                replace(batch, |events| events.into_iter().map(runs).collect());
                 batch.reached = batch.reached.map(|reached| CameraMicros(reached.0 + reached.0 / 10));
             }
             CameraFault::Flood | CameraFault::Unplugged | CameraFault::Silent | CameraFault::Hiccup => {}
         }
     }
+}
+
+/// Puts others in the place of a batch's events.
+fn replace(batch: &mut EventBatch, others: impl FnOnce(Vec<Event>) -> Vec<Event>) {
+    let events = batch.events.to_vec();
+    batch.events.clear();
+    batch.lost += batch.events.append(others(events));
 }
 
 impl Camera for FaultyCamera {

@@ -91,7 +91,7 @@ impl Bench {
         let end = self.clock.now() + duration;
         while self.clock.now() < end {
             camera.read(&mut batch, Duration::from_millis(5))?;
-            events.extend_from_slice(&batch.events);
+            events.extend(batch.events.iter());
             lost += batch.lost;
         }
         Ok((events, lost))

@@ -87,7 +87,7 @@ fn babble_neither_panics_nor_turns_time_back_and_ends_the_handle() {
                 Ok(()) => {}
                 Err(error) => break error,
             }
-            for event in &batch.events {
+            for event in batch.events.iter() {
                 assert!(event.t.0 >= last && geometry.contains(event.x, event.y));
                 last = event.t.0;
             }

@@ -3,10 +3,10 @@
 use core::time::Duration;
 
 use evfocus_core::{
-    CameraMicros, Event, Geometry, LensPosition, LensTrace, Polarity, SweepCapacity, SweepRecorder,
+    CameraMicros, Event, EventList, Geometry, LensPosition, LensTrace, Polarity, SweepCapacity, SweepRecorder,
 };
 
-/// Events of a batch; 16 MB, as many as the caches of a small computer do not hold.
+/// Events of a batch; 8 MB, as many as the caches of a small computer do not hold.
 pub(crate) const BATCH: usize = 1_000_000;
 /// Length of a sweep.
 pub(crate) const SWEEP_US: i64 = 4_000_000;
@@ -31,6 +31,13 @@ pub(crate) fn batch(first: i64, length_us: i64) -> Vec<Event> {
         .collect()
 }
 
+/// `events` as they come from a camera.
+pub(crate) fn list(events: &[Event]) -> EventList {
+    let mut list = EventList::with_capacity(events.len());
+    assert_eq!(list.append(events.iter().copied()), 0, "they lie close together");
+    list
+}
+
 /// The same batch `later_us` later.
 pub(crate) fn delay(batch: &mut [Event], later_us: i64) {
     for event in batch {
@@ -47,7 +54,7 @@ pub(crate) fn sweep(events: usize, kept: usize) -> (SweepRecorder, LensTrace<Cam
     let batches = (events / BATCH) as i64;
     let mut batch = batch(0, SWEEP_US / batches);
     for _ in 0..batches {
-        recorder.feed(&batch);
+        recorder.feed(list(&batch).as_slice());
         delay(&mut batch, SWEEP_US / batches);
     }
     (recorder, trace())

@@ -4,7 +4,8 @@ use alloc::vec::Vec;
 
 use super::watcher::Watcher;
 use super::{Action, Controller, ControllerConfig, FocusRequest, FocusState, Mode, Refusal, State};
-use crate::event::{Event, Geometry, Window};
+use crate::event::{Geometry, Window};
+use crate::event_list::Events;
 use crate::lens_trace::LensSample;
 use crate::report::{Outcome, RunId};
 use crate::units::{HostMicros, LensPosition};
@@ -125,7 +126,7 @@ impl Controller {
     }
 
     /// Events came while there was no run.
-    pub(super) fn watch_events(&mut self, events: &[Event], now: HostMicros) {
+    pub(super) fn watch_events(&mut self, events: Events<'_>, now: HostMicros) {
         if self.is_watching() {
             self.continuous.watcher.take(events, now);
         }

@@ -7,7 +7,8 @@ use super::ControllerConfig;
 use crate::analysis::{Analyzer, Question, describe};
 use crate::clock_map::ClockMap;
 use crate::curve::CurvePoint;
-use crate::event::{Event, EventBatch, Geometry};
+use crate::event::{EventBatch, Geometry};
+use crate::event_list::Events;
 use crate::hot_pixels::HotPixels;
 use crate::lens_trace::{LensSample, LensTrace};
 use crate::measure::event_rate;
@@ -73,7 +74,7 @@ impl SweepState {
         self.analyzer.begin_rest();
     }
 
-    pub(super) fn observe_rest(&mut self, events: &[Event]) {
+    pub(super) fn observe_rest(&mut self, events: Events<'_>) {
         self.hot_pixels.observe(events);
         self.analyzer.observe_rest(events);
     }
@@ -147,10 +148,10 @@ impl SweepState {
     /// Counts what belongs to the sweep: events since its origin, before its end, of pixels that are not hot.
     pub(super) fn feed(&mut self, batch: &EventBatch, reached: CameraMicros) {
         let events = batch.events.as_slice();
-        let from = events.partition_point(|event| event.t < self.origin);
-        let to = self.end.map_or(events.len(), |end| events.partition_point(|event| event.t < end));
+        let from = events.first_at_or_after(self.origin);
+        let to = self.end.map_or(events.len(), |end| events.first_at_or_after(end));
         let hot_pixels = &self.hot_pixels;
-        for run in events.get(from..to).unwrap_or_default().split(|event| hot_pixels.is_hot(event)) {
+        for run in events.range(from..to).split(|event| hot_pixels.is_hot(event)) {
             self.recorder.feed(run);
         }
         self.recorder.advance_to(reached);

@@ -2,7 +2,8 @@
 
 use core::time::Duration;
 
-use crate::event::{Event, Geometry, Window};
+use crate::event::{Geometry, Window};
+use crate::event_list::Events;
 use crate::sharpness::SharpnessMeter;
 use crate::units::HostMicros;
 
@@ -104,7 +105,7 @@ impl Watcher {
     }
 
     /// Takes events at a lens that stands where the picture was sharp.
-    pub(super) fn take(&mut self, events: &[Event], now: HostMicros) {
+    pub(super) fn take(&mut self, events: Events<'_>, now: HostMicros) {
         let Some(reading) = self.meter.take(events) else { return };
         let Some(reference) = self.reference else {
             let (readings, sum) = (self.learnt.0 + 1, self.learnt.1 + reading);

@@ -6,16 +6,16 @@ mod time;
 
 pub use counter::DavisWordCounter;
 
-use alloc::vec::Vec;
-
 use super::TimeRule;
 use super::framing::Framing;
-use super::runs::kept_while;
+use super::runs::{Kind, decode_run};
 use super::vectorized::{TakeWords, take_words};
 use crate::damage::Damage;
 use crate::event::{Event, EventBatch, Geometry, Polarity};
+use crate::event_list::EventList;
+use crate::packed_event::PackedEvent;
 use crate::units::CameraMicros;
-use time::DavisTime;
+use time::{DavisTime, TIME_PERIOD_US};
 
 /// One word, taken apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +34,8 @@ enum Word {
     Wrap(u16),
 }
 
+/// Bits 14 to 0 of a time word.
+const TIME_MASK: u16 = 0x7FFF;
 /// Bits 11 to 0: what a word's code is about.
 const DATA_MASK: u16 = 0x0FFF;
 /// Of a column word: brighter.
@@ -53,7 +55,7 @@ mod special {
 impl Word {
     fn of(word: u16) -> Self {
         if word & 0x8000 != 0 {
-            return Self::Time(word & 0x7FFF);
+            return Self::Time(word & TIME_MASK);
         }
         let data = word & DATA_MASK;
         match word >> 12 {
@@ -115,9 +117,9 @@ impl DavisWordDecoder {
     /// Appends the events in `bytes` to the batch and sets [`EventBatch::reached`]; at most one event per word.
     pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         let state = &mut self.state;
-        let dropped = state.damage.events_before_address + state.damage.outside_sensor;
+        let lost = state.lost();
         self.framing.feed_slices(bytes, |words| take_words(state, words, &mut batch.events));
-        batch.lost += state.damage.events_before_address + state.damage.outside_sensor - dropped;
+        batch.lost += state.lost() - lost;
         batch.reached = state.time.now().map(CameraMicros).or(batch.reached);
     }
 
@@ -144,15 +146,28 @@ impl Default for DavisWordDecoder {
     }
 }
 
-impl TakeWords<Vec<Event>> for State {
+/// What may stand between events.
+const KINDS: [Kind; 16] = {
+    let mut kinds = [Kind::OTHER; 16];
+    kinds[1] = Kind::column(DATA_MASK, DavisWordDecoder::GEOMETRY.width);
+    let mut upper_bits = 8;
+    while upper_bits < 16 {
+        kinds[upper_bits] = Kind::time(TIME_MASK);
+        upper_bits += 1;
+    }
+    kinds
+};
+
+impl TakeWords<EventList> for State {
     #[inline(always)]
-    fn take_words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
+    fn take_words(&mut self, mut words: &[[u8; 2]], events: &mut EventList) {
         while let Some((&first, rest)) = words.split_first() {
-            if is_column(first) {
-                words = self.columns(words, events);
-            } else {
-                self.word(Word::of(u16::from_le_bytes(first)));
+            let taken = self.columns(words, events);
+            if taken == 0 {
+                self.word(Word::of(u16::from_le_bytes(first)), events);
                 words = rest;
+            } else {
+                words = words.get(taken..).unwrap_or_default();
             }
         }
     }
@@ -160,14 +175,20 @@ impl TakeWords<Vec<Event>> for State {
 
 impl State {
     #[inline(always)]
-    fn word(&mut self, word: Word) {
+    fn word(&mut self, word: Word, events: &mut EventList) {
         match word {
             Word::Time(low) => self.time.low(low),
             Word::Row(row) => self.row(row),
+            Word::Column(y, polarity) => self.column(y, polarity, events),
             Word::Special(signal) => self.special(signal),
-            Word::NoEvents | Word::Column(..) => {}
+            Word::NoEvents => {}
             Word::Wrap(times) => self.time.wrap(times),
         }
+    }
+
+    /// Events that a batch must tell of: those before the first time are not missed by anybody.
+    fn lost(&self) -> u64 {
+        self.damage.events_before_address + self.damage.outside_sensor + self.damage.too_far_in_time
     }
 
     fn special(&mut self, signal: u16) {
@@ -185,31 +206,37 @@ impl State {
         self.column = if exists { Column::At(row) } else { Column::OutsideSensor };
     }
 
-    /// Events, which come in runs of one time and row; returns the words after them.
+    /// The words at the front, as long as there are but events, their rows and times. Returns how many.
     #[inline(always)]
-    fn columns<'words>(&mut self, words: &'words [[u8; 2]], events: &mut Vec<Event>) -> &'words [[u8; 2]] {
-        let (Some(t), Column::At(x)) = (self.time.now(), self.column) else {
-            let run = words.iter().take_while(|bytes| is_column(**bytes)).count();
-            self.drop(run as u64);
-            return words.get(run..).unwrap_or_default();
-        };
-        let event = move |word: u16| Event {
-            t: CameraMicros(t),
-            x,
-            y: word & DATA_MASK,
-            polarity: Polarity::from_on(word & POLARITY_BIT != 0),
-        };
+    fn columns(&mut self, words: &[[u8; 2]], events: &mut EventList) -> usize {
+        let (Some(now), Column::At(x)) = (self.time.now(), self.column) else { return 0 };
+        let times = events.since_origin_and_coarse(CameraMicros(now), self.time.wraps_us(), TIME_PERIOD_US);
+        let Some((since, wraps)) = times else { return 0 };
         let height = DavisWordDecoder::GEOMETRY.height;
-        let kept = move |word: u16| (word >> 13 == COLUMN_KIND) & (word & DATA_MASK < height);
-        let rest = kept_while(words, kept, event, events);
-        // What ended the run may be an event in a row of the picture that does not exist.
-        match rest.split_first() {
-            Some((&next, after)) if is_column(next) => {
-                self.damage.outside_sensor += 1;
-                after
-            }
-            _ => rest,
+        let is_event = |word: u16| (word >> 13 == COLUMN_KIND) & (word & DATA_MASK < height);
+        let event = |shared: PackedEvent, word: u16| {
+            shared.in_row(word & DATA_MASK).brighter(word & POLARITY_BIT != 0)
+        };
+        let mut shared = PackedEvent::at(since).in_column(x);
+        let wraps = PackedEvent::at(wraps);
+        let taken = decode_run(words, &KINDS, is_event, event, (&mut shared, wraps), events);
+        self.column = Column::At(shared.column());
+        self.time.advance_to(events.time_of(shared).0);
+        taken
+    }
+
+    /// One event by itself.
+    fn column(&mut self, y: u16, polarity: Polarity, events: &mut EventList) {
+        let (Some(t), Column::At(x)) = (self.time.now(), self.column) else {
+            self.drop(1);
+            return;
+        };
+        if y >= DavisWordDecoder::GEOMETRY.height {
+            self.damage.outside_sensor += 1;
+            return;
         }
+        let kept = events.push(Event { t: CameraMicros(t), x, y, polarity });
+        self.damage.too_far_in_time += u64::from(kept.is_err());
     }
 
     /// Events that cannot be placed.
@@ -220,11 +247,6 @@ impl State {
             (Some(_), Column::OutsideSensor) => self.damage.outside_sensor += events,
         }
     }
-}
-
-/// Whether a word is a column, of either polarity.
-fn is_column(bytes: [u8; 2]) -> bool {
-    u16::from_le_bytes(bytes) >> 13 == COLUMN_KIND
 }
 
 /// Whether `bytes`, the start of a file, could be nothing but DAVIS346 words: every word is one that the camera sends, all

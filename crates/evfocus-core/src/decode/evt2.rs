@@ -1,10 +1,9 @@
 //! EVT 2.0: 32-bit words, little-endian, the type in bits 31 to 28 (Prophesee, "EVT 2.0 Format"; the wrap as in OpenEB).
 
-use alloc::vec::Vec;
-
 use super::framing::Framing;
 use crate::damage::Damage;
 use crate::event::{Event, EventBatch, Geometry, Polarity};
+use crate::event_list::EventList;
 use crate::units::CameraMicros;
 
 /// The type of a word, bits 31 to 28.
@@ -85,9 +84,10 @@ impl Evt2Decoder {
     /// Appends the events in `bytes` to the batch and sets [`EventBatch::reached`]; at most one event per word.
     pub fn decode(&mut self, bytes: &[u8], batch: &mut EventBatch) {
         let state = &mut self.state;
-        let dropped = state.damage.outside_sensor;
+        let lost = |damage: &Damage| damage.outside_sensor + damage.too_far_in_time;
+        let lost_before = lost(&state.damage);
         self.framing.feed(bytes, |word| state.word(u32::from_le_bytes(word), &mut batch.events));
-        batch.lost += state.damage.outside_sensor - dropped;
+        batch.lost += lost(&state.damage) - lost_before;
         batch.reached = state.coarse.map(CameraMicros).or(batch.reached);
     }
 
@@ -108,7 +108,7 @@ impl Evt2Decoder {
 }
 
 impl State {
-    fn word(&mut self, word: u32, events: &mut Vec<Event>) {
+    fn word(&mut self, word: u32, events: &mut EventList) {
         match WordType::of(word) {
             WordType::CdOff => self.change(word, Polarity::Off, events),
             WordType::CdOn => self.change(word, Polarity::On, events),
@@ -127,7 +127,7 @@ impl State {
         self.coarse = Some(self.period_start.saturating_add(sent));
     }
 
-    fn change(&mut self, word: u32, polarity: Polarity, events: &mut Vec<Event>) {
+    fn change(&mut self, word: u32, polarity: Polarity, events: &mut EventList) {
         let Some(coarse) = self.coarse else {
             self.damage.events_before_time += 1;
             return;
@@ -138,6 +138,7 @@ impl State {
             return;
         }
         let t = coarse.saturating_add(i64::from((word >> 22) & FINE_TIME_MASK));
-        events.push(Event { t: CameraMicros(t), x, y, polarity });
+        let kept = events.push(Event { t: CameraMicros(t), x, y, polarity });
+        self.damage.too_far_in_time += u64::from(kept.is_err());
     }
 }

@@ -7,14 +7,14 @@ mod time;
 
 pub use counter::Evt3Counter;
 
-use alloc::vec::Vec;
-
 use super::TimeRule;
 use super::framing::Framing;
-use super::runs::kept_while;
+use super::runs::{Kind, decode_run};
 use super::vectorized::{TakeWords, take_words};
 use crate::damage::Damage;
 use crate::event::{Event, EventBatch, Geometry, Polarity};
+use crate::event_list::EventList;
+use crate::packed_event::PackedEvent;
 use crate::units::CameraMicros;
 use rate_control::RateControl;
 use time::Evt3Time;
@@ -51,6 +51,8 @@ const ADDRESS_MASK: u16 = 0x7FF;
 pub const POLARITY_BIT: u16 = 0x800;
 /// Bits 11 to 0: the payload of most words.
 const PAYLOAD_MASK: u16 = 0xFFF;
+/// Microseconds of a coarse unit of time: until TIME_LOW wraps.
+const FINE_PERIOD_US: i64 = 1 << 12;
 /// Microseconds until the 24 bits of time wrap.
 pub const TIME_PERIOD_US: i64 = 1 << 24;
 
@@ -94,14 +96,14 @@ pub struct Evt3Decoder {
 #[derive(Debug, Clone)]
 struct State {
     geometry: Geometry,
+    kinds: [Kind; 16],
     time: Evt3Time,
     /// Row of the events that follow.
     row: Row,
     /// Column of the next vector's first pixel.
     base: Option<u16>,
-    /// An event of the next vector, complete but for its column. Copies of it take two stores each, of the event and of the column; put
-    /// together in its place each would take four, and stores are what bounds decoding.
-    of_vector: Event,
+    /// Polarity of the vectors that follow.
+    base_is_on: bool,
     triggers: u64,
     rate_control: RateControl,
     damage: Damage,
@@ -138,10 +140,11 @@ impl Evt3Decoder {
     fn with_time(geometry: Geometry, time: Evt3Time) -> Self {
         let state = State {
             geometry,
+            kinds: kinds(geometry),
             time,
             row: Row::None,
             base: None,
-            of_vector: Event { t: CameraMicros(0), x: 0, y: 0, polarity: Polarity::Off },
+            base_is_on: false,
             triggers: 0,
             rate_control: RateControl::default(),
             damage: Damage::default(),
@@ -177,38 +180,41 @@ impl Evt3Decoder {
     }
 }
 
-impl TakeWords<Vec<Event>> for State {
+/// What may stand between single events.
+fn kinds(geometry: Geometry) -> [Kind; 16] {
+    let mut kinds = [Kind::OTHER; 16];
+    kinds[usize::from(word_type::ADDR_Y)] = Kind::row(ADDRESS_MASK, geometry.height);
+    kinds[usize::from(word_type::TIME_LOW)] = Kind::time(PAYLOAD_MASK);
+    kinds
+}
+
+impl TakeWords<EventList> for State {
     #[inline(always)]
-    fn take_words(&mut self, mut words: &[[u8; 2]], events: &mut Vec<Event>) {
+    fn take_words(&mut self, mut words: &[[u8; 2]], events: &mut EventList) {
         while let Some((&first, rest)) = words.split_first() {
             let word = u16::from_le_bytes(first);
-            if word >> 12 == word_type::ADDR_X {
-                words = self.singles(words, events);
-            } else {
+            let taken = if word >> 12 == word_type::ADDR_X { self.singles(words, events) } else { 0 };
+            if taken == 0 {
                 self.word(word, events);
                 words = rest;
+            } else {
+                words = words.get(taken..).unwrap_or_default();
             }
         }
     }
 }
 
 impl State {
-    /// Any word but ADDR_X.
     #[inline(always)]
-    fn word(&mut self, word: u16, events: &mut Vec<Event>) {
+    fn word(&mut self, word: u16, events: &mut EventList) {
         match word >> 12 {
-            word_type::TIME_LOW => {
-                self.time.low(word & PAYLOAD_MASK);
-                self.of_vector.t = CameraMicros(self.time.now().unwrap_or_default());
-            }
+            word_type::TIME_LOW => self.time.low(word & PAYLOAD_MASK),
             word_type::ADDR_Y => self.row(word & ADDRESS_MASK),
-            word_type::TIME_HIGH => {
-                self.time.high(word & PAYLOAD_MASK);
-                self.of_vector.t = CameraMicros(self.time.now().unwrap_or_default());
-            }
+            word_type::ADDR_X => self.single(word, events),
+            word_type::TIME_HIGH => self.time.high(word & PAYLOAD_MASK),
             word_type::VECT_BASE_X => {
                 self.base = Some(word & ADDRESS_MASK);
-                self.of_vector.polarity = Polarity::from_on(word & POLARITY_BIT != 0);
+                self.base_is_on = word & POLARITY_BIT != 0;
             }
             word_type::VECT_12 => self.vector(word & PAYLOAD_MASK, 12, events),
             word_type::VECT_8 => self.vector(word & 0xFF, 8, events),
@@ -226,69 +232,77 @@ impl State {
 
     /// Events that a batch must tell of: those before the first time are not missed by anybody.
     fn lost(&self) -> u64 {
-        self.damage.events_before_address + self.damage.outside_sensor + self.damage.dropped_by_camera
+        let damage = &self.damage;
+        damage.events_before_address
+            + damage.outside_sensor
+            + damage.too_far_in_time
+            + damage.dropped_by_camera
     }
 
     fn row(&mut self, y: u16) {
         self.row = if y < self.geometry.height { Row::At(y) } else { Row::OutsideSensor };
-        self.of_vector.y = y;
     }
 
-    /// Single events, which come in runs of one row and time; returns the words after them.
+    /// The words at the front, as long as there are but single events, their rows and times. Returns how many.
     #[inline(always)]
-    fn singles<'words>(&mut self, words: &'words [[u8; 2]], events: &mut Vec<Event>) -> &'words [[u8; 2]] {
-        let (Some(t), Row::At(y)) = (self.time.now(), self.row) else {
-            let is_single = |bytes: &&[u8; 2]| u16::from_le_bytes(**bytes) >> 12 == word_type::ADDR_X;
-            let run = words.iter().take_while(is_single).count();
-            self.drop(run);
-            return words.get(run..).unwrap_or_default();
-        };
+    fn singles(&mut self, words: &[[u8; 2]], events: &mut EventList) -> usize {
+        let (Some(now), Row::At(row)) = (self.time.now(), self.row) else { return 0 };
+        let coarse_us = self.time.coarse().1;
+        let times = events.since_origin_and_coarse(CameraMicros(now), coarse_us, FINE_PERIOD_US);
+        let Some((since, coarse)) = times else { return 0 };
         let width = self.geometry.width;
-        let event = move |word: u16| Event {
-            t: CameraMicros(t),
-            x: word & ADDRESS_MASK,
-            y,
-            polarity: Polarity::from_on(word & POLARITY_BIT != 0),
+        let is_event = |word: u16| (word >> 12 == word_type::ADDR_X) & (word & ADDRESS_MASK < width);
+        let event = |shared: PackedEvent, word: u16| {
+            shared.in_column(word & ADDRESS_MASK).brighter(word & POLARITY_BIT != 0)
         };
-        let rest = kept_while(
-            words,
-            move |word| (word >> 12 == word_type::ADDR_X) & (word & ADDRESS_MASK < width),
-            event,
-            events,
-        );
-        // What ended the run may be a single event in a column that does not exist.
-        match rest.split_first() {
-            Some((&next, after)) if u16::from_le_bytes(next) >> 12 == word_type::ADDR_X => {
-                self.damage.outside_sensor += 1;
-                after
-            }
-            _ => rest,
+        let mut shared = PackedEvent::at(since).in_row(row);
+        let coarse = PackedEvent::at(coarse);
+        let taken = decode_run(words, &self.kinds, is_event, event, (&mut shared, coarse), events);
+        self.row = Row::At(shared.row());
+        self.time.advance_to(events.time_of(shared).0);
+        taken
+    }
+
+    /// One event by itself.
+    fn single(&mut self, word: u16, events: &mut EventList) {
+        let (Some(t), Row::At(y)) = (self.time.now(), self.row) else {
+            self.drop(1);
+            return;
+        };
+        let x = word & ADDRESS_MASK;
+        if x >= self.geometry.width {
+            self.damage.outside_sensor += 1;
+            return;
         }
+        let polarity = Polarity::from_on(word & POLARITY_BIT != 0);
+        let kept = events.push(Event { t: CameraMicros(t), x, y, polarity });
+        self.damage.too_far_in_time += u64::from(kept.is_err());
     }
 
     #[inline(always)]
-    fn vector(&mut self, valid: u16, pixels: u16, events: &mut Vec<Event>) {
+    fn vector(&mut self, valid: u16, pixels: u16, events: &mut EventList) {
         // Saturates on streams that are not a camera's: columns that far out are dropped anyhow.
         let next = self.base.map(|base| base.saturating_add(pixels));
         let base = core::mem::replace(&mut self.base, next);
-        let (Some(base), Some(_), Row::At(_)) = (base, self.time.now(), self.row) else {
+        let (Some(base), Some(now), Row::At(row)) = (base, self.time.now(), self.row) else {
             self.drop(valid.count_ones() as usize);
             return;
         };
         let on_sensor = (1 << self.geometry.width.saturating_sub(base).min(pixels)) - 1;
         let inside = valid & on_sensor;
+        let count = inside.count_ones() as usize;
         self.damage.outside_sensor += u64::from((valid ^ inside).count_ones());
+        let Some(since) = events.since_origin(CameraMicros(now)) else {
+            self.damage.too_far_in_time += count as u64;
+            return;
+        };
         // Twelve events are written, and as many kept as there are bits: a branch for each bit would be guessed wrong half of the time.
-        let mut offsets = packed_offsets(inside);
-        let length = events.len();
-        events.resize(length + 12, self.of_vector);
-        if let Some(slots) = events.get_mut(length..).and_then(<[Event]>::first_chunk_mut::<12>) {
-            for slot in slots {
-                slot.x = base.wrapping_add((offsets & 0xF) as u16);
-                offsets >>= 4;
-            }
-        }
-        events.truncate(length + inside.count_ones() as usize);
+        let shared = PackedEvent::at(since).in_row(row).brighter(self.base_is_on);
+        let offsets = packed_offsets(inside);
+        let twelve = core::array::from_fn::<_, 12, _>(|place| {
+            shared.in_column(base.wrapping_add((offsets >> (4 * place) & 0xF) as u16) & ADDRESS_MASK)
+        });
+        events.append_packed(twelve, count);
     }
 
     /// Events that cannot be placed.

@@ -18,7 +18,8 @@ mod travel;
 use alloc::vec::Vec;
 
 use super::{Estimate, SearchError, all_events_kept};
-use crate::event::{Event, Geometry, Window};
+use crate::event::{Geometry, Window};
+use crate::event_list::Events;
 use crate::event_store::EventStore;
 use crate::lens_trace::LensTrace;
 use crate::sweep::Sweep;
@@ -141,9 +142,9 @@ impl StructureSearch {
         self.noise.forget();
     }
 
-    pub(crate) fn observe_rest(&mut self, events: &[Event]) {
-        for event in events {
-            self.noise.take(event);
+    pub(crate) fn observe_rest(&mut self, events: Events<'_>) {
+        for event in events.iter() {
+            self.noise.take(&event);
         }
     }
 

@@ -4,8 +4,8 @@ use core::time::Duration;
 
 use evfocus_core::controller::{Command, DeviceFailure, FocusRequest, Input, Mode, Pause};
 use evfocus_core::{
-    CameraMicros, ControllerConfig, Event, EventBatch, HostMicros, LensPosition, LensRange, LensSample,
-    LensSpeed, Method, Polarity, SweepCapacity,
+    CameraMicros, ControllerConfig, Event, EventBatch, EventList, HostMicros, LensPosition, LensRange,
+    LensSample, LensSpeed, Method, Polarity, SweepCapacity,
 };
 use proptest::prelude::*;
 
@@ -131,7 +131,8 @@ proptest! {
                 Happening::Command(command) => drop(rig.command(command)),
                 Happening::Batch { times, arrival, reached, lost } => {
                     let event = |t| Event { t: CameraMicros(t), x: 1, y: 1, polarity: Polarity::On };
-                    let events = times.into_iter().map(event).collect();
+                    let mut events = EventList::default();
+                    let lost = lost + events.append(times.into_iter().map(event));
                     let (arrival, reached) = (HostMicros(arrival), reached.map(CameraMicros));
                     rig.input(Input::Batch(&EventBatch { events, arrival, reached, lost }));
                 }

@@ -262,7 +262,7 @@ impl Rig {
             let gains = -distance.signum() * self.way;
             let picture = self.scene.texture * (1.0 - self.scene.flicker) * stripe * gains;
             let polarity = Polarity::from_on(chance < f64::midpoint(1.0, flicker + picture));
-            self.batch.events.push(Event { t: time, x, y, polarity });
+            self.batch.events.push(Event { t: time, x, y, polarity }).unwrap();
         }
     }
 

@@ -17,7 +17,7 @@ type Bins = BTreeMap<i64, u64>;
 fn decoded(batch: &EventBatch, bin_us: u32) -> (Bins, u64) {
     let mut bins = Bins::new();
     let bin_us = i64::from(bin_us);
-    for event in &batch.events {
+    for event in batch.events.iter() {
         *bins.entry(event.t.0.div_euclid(bin_us) * bin_us).or_default() += 1;
     }
     (bins, batch.lost)

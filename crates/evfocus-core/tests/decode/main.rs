@@ -7,4 +7,6 @@ mod counts;
 #[cfg(test)]
 mod pieces;
 #[cfg(test)]
+mod plain;
+#[cfg(test)]
 mod words;

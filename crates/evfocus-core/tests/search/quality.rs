@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 use core::time::Duration;
 
-use evfocus_core::{CameraMicros, Event, HotPixels, Polarity, SweepQuality};
+use evfocus_core::{CameraMicros, Event, EventList, HotPixels, Polarity, SweepQuality};
 
 use crate::random::Xorshift;
 use crate::stream::{GEOMETRY, event, poisson, position_is_time, record};
@@ -97,9 +97,10 @@ fn learn(background: usize, often: usize) -> (HotPixels, Event) {
     let mut random = Xorshift::new(6);
     let mut hot_pixels = HotPixels::new(GEOMETRY);
     let suspect = Event { t: CameraMicros(0), x: 17, y: 4, polarity: Polarity::On };
-    let scene: Vec<_> = (0..background).map(|_| event(&mut random, 0)).collect();
-    hot_pixels.observe(&scene);
-    hot_pixels.observe(&vec![suspect; often]);
+    let scene = (0..background).map(|_| event(&mut random, 0)).collect();
+    let list = |events: Vec<Event>| EventList::of(events).unwrap();
+    hot_pixels.observe(list(scene).as_slice());
+    hot_pixels.observe(list(vec![suspect; often]).as_slice());
     hot_pixels.learn(Duration::from_millis(100));
     (hot_pixels, suspect)
 }
@@ -136,7 +137,7 @@ fn a_few_events_prove_nothing_and_a_restart_forgets() {
 fn events_off_the_sensor_are_no_pixels() {
     let mut hot_pixels = HotPixels::new(GEOMETRY);
     let outside = Event { t: CameraMicros(0), x: GEOMETRY.width, y: 0, polarity: Polarity::On };
-    hot_pixels.observe(&[outside; 100]);
+    hot_pixels.observe(EventList::of([outside; 100]).unwrap().as_slice());
     hot_pixels.learn(Duration::from_millis(100));
     assert_eq!((hot_pixels.number(), hot_pixels.is_hot(&outside)), (0, false));
 }

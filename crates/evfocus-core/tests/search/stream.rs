@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use evfocus_core::{
-    CameraMicros, Event, Geometry, LensPosition, LensTrace, Polarity, SweepCapacity, SweepRecorder,
+    CameraMicros, Event, EventList, Geometry, LensPosition, LensTrace, Polarity, SweepCapacity, SweepRecorder,
 };
 
 use crate::random::Xorshift;
@@ -49,7 +49,7 @@ pub(crate) fn record(events: &[Event], kept: usize) -> SweepRecorder {
     let mut recorder =
         SweepRecorder::new(GEOMETRY, SweepCapacity { longest, events: kept, ..SweepCapacity::default() });
     recorder.start(first);
-    recorder.feed(events);
+    recorder.feed(EventList::of(events.iter().copied()).unwrap().as_slice());
     recorder
 }
 

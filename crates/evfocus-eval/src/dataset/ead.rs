@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use evfocus_core::{CameraMicros, Event, Geometry, LensPosition, LensTrace, Polarity};
+use evfocus_core::{CameraMicros, Event, EventList, Geometry, LensPosition, LensTrace, Polarity};
 use matrw::{MatFile, MatVariable, MatlabType, MatrwError};
 
 use super::{Condition, Dataset, Entry, Label, Sequence, Source, Unit};
@@ -144,6 +144,7 @@ pub fn read(path: &Path, truth: f64) -> anyhow::Result<Sequence> {
         trace.push_if_later(last.t, LensPosition(position));
     }
     events.sort_by_key(|event| event.t);
+    let events = EventList::of(events).with_context(|| format!("{shown}: not from this camera"))?;
     Ok(Sequence { geometry: GEOMETRY, events, trace, truths: vec![truth], frames: None })
 }
 

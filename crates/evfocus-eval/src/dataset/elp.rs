@@ -14,7 +14,7 @@ use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use evfocus_core::{CameraMicros, Event, Geometry, LensPosition, LensTrace, Polarity};
+use evfocus_core::{CameraMicros, Event, EventList, Geometry, LensPosition, LensTrace, Polarity};
 use npyz::{DType, Endianness, NpyFile, Order, TypeChar, TypeStr};
 
 use super::{Condition, Dataset, Entry, Label, Sequence, Source, Unit};
@@ -87,7 +87,7 @@ pub fn read(folder: &Path) -> anyhow::Result<Sequence> {
     if let Some(end) = time_in(&info, "end_timestamp") {
         events.retain(|event| event.t.0 <= end);
     }
-    let (Some(first), Some(last)) = (events.first(), events.last()) else {
+    let (Some(&first), Some(&last)) = (events.first(), events.last()) else {
         bail!("{}: no events within the times of {INFO_FILE}", folder.display());
     };
     let position = |time: i64| (time - first.t.0) as f64 * 1e-3;
@@ -96,6 +96,8 @@ pub fn read(folder: &Path) -> anyhow::Result<Sequence> {
     trace.push_if_later(last.t, LensPosition(position(last.t.0)));
     let side = |of: fn(&Event) -> u16| events.iter().map(of).max().unwrap_or(0).saturating_add(1);
     let geometry = Geometry { width: side(|event| event.x), height: side(|event| event.y) };
+    let events =
+        EventList::of(events).with_context(|| format!("{}: not from this camera", folder.display()))?;
     let truths = vec![position(truth)];
     Ok(Sequence { geometry, events, trace, truths, frames: None })
 }

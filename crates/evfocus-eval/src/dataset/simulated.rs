@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use evfocus_core::{Event, HostMicros, LensPosition, LensSpeed};
+use evfocus_core::{Events, HostMicros, LensPosition, LensSpeed};
 use evfocus_record::Evt3Writer;
 use hil_sim::{CameraModel, Light, MotionConfig, Rig, RigConfig, Scene, SensorConfig};
 use rand::RngExt;
@@ -115,8 +115,8 @@ struct Observer {
 }
 
 impl SweepObserver for Observer {
-    fn events(&mut self, events: &[Event]) -> anyhow::Result<()> {
-        Ok(self.recording.write(events)?)
+    fn events(&mut self, events: Events<'_>) -> anyhow::Result<()> {
+        Ok(self.recording.write(events.iter())?)
     }
 
     fn passed(&mut self, now: HostMicros, rig: &Rig) -> anyhow::Result<()> {

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use evfocus_core::{CameraMicros, EventBatch};
+use evfocus_core::{CameraMicros, EventBatch, EventList};
 use evfocus_record::{MAX_EVENTS_PER_READ, Recording, positions};
 use npyz::WriterBuilder;
 use serde::{Deserialize, Serialize};
@@ -105,10 +105,10 @@ pub fn read(recording: &Path) -> anyhow::Result<Sequence> {
     let geometry = recording
         .geometry()
         .with_context(|| format!("{}: the recording does not tell the sensor's size", path.display()))?;
-    let mut events = Vec::new();
+    let mut events = EventList::default();
     let mut batch = EventBatch::with_capacity(MAX_EVENTS_PER_READ);
     while recording.read(&mut batch)? {
-        events.extend_from_slice(&batch.events);
+        batch.events.iter().try_for_each(|event| events.push(event))?;
     }
     let trace = positions::read(beside(path, POSITIONS))?;
     let truth = read_truth(&beside(path, TRUTH))?;

@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 
-use evfocus_core::{CameraMicros, Damage, Event, EventBatch, Geometry, Polarity};
+use evfocus_core::{CameraMicros, Damage, DoesNotFit, Event, EventBatch, Geometry, Polarity};
 
 use super::compression::Compression;
 use super::description::{EventStream, first_event_stream};
@@ -126,7 +126,15 @@ impl Aedat4Source {
             self.pending.start += EVENT_BYTES;
             match event(bytes) {
                 Some(event) if geometry.is_none_or(|geometry| geometry.contains(event.x, event.y)) => {
-                    batch.events.push(event);
+                    match batch.events.push(event) {
+                        Ok(()) => {}
+                        Err(DoesNotFit::Address { .. }) => dropped += 1,
+                        Err(DoesNotFit::Time { .. }) => {
+                            // It will be the first of the next batch.
+                            self.pending.start -= EVENT_BYTES;
+                            break;
+                        }
+                    }
                 }
                 _ => dropped += 1,
             }

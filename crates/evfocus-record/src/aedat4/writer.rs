@@ -1,5 +1,6 @@
 //! Writes AEDAT 4 files with one stream of events.
 
+use std::borrow::Borrow;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -74,8 +75,9 @@ impl Aedat4Writer {
     /// # Errors
     /// [`RecordError::Encode`] for an event outside of the sensor (those before it are written), [`RecordError::Write`] if
     /// the system refuses.
-    pub fn write(&mut self, events: &[Event]) -> Result<(), RecordError> {
-        for &event in events {
+    pub fn write(&mut self, events: impl IntoIterator<Item: Borrow<Event>>) -> Result<(), RecordError> {
+        for event in events {
+            let event = *event.borrow();
             if !self.geometry.contains(event.x, event.y) {
                 let source = EncodeError::OutsideSensor { event, geometry: self.geometry };
                 return Err(RecordError::Encode { path: self.path.clone(), source });

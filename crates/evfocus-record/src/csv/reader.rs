@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use evfocus_core::{EventBatch, Geometry};
+use evfocus_core::{DoesNotFit, Event, EventBatch, Geometry};
 
 use super::layout::is_blank;
 use super::{Layout, MAX_LINE_BYTES};
@@ -18,6 +18,8 @@ pub(crate) struct CsvSource {
     line: Vec<u8>,
     line_number: u64,
     header_passed: bool,
+    /// Too far in time from the events of the batch before.
+    held: Option<Event>,
 }
 
 /// Events handed out at a time.
@@ -41,7 +43,7 @@ impl CsvSource {
             }
         })?;
         let file = BufReader::with_capacity(READ_BYTES, file);
-        Ok(Self { file, layout, line: Vec::new(), line_number: 0, header_passed: false })
+        Ok(Self { file, layout, line: Vec::new(), line_number: 0, header_passed: false, held: None })
     }
 
     pub(crate) fn geometry(&self) -> Option<Geometry> {
@@ -50,6 +52,9 @@ impl CsvSource {
 
     /// Appends events; `false` with none at the end of the file.
     pub(crate) fn read(&mut self, path: &Path, batch: &mut EventBatch) -> Result<bool, RecordError> {
+        if let Some(held) = self.held.take() {
+            batch.events.append([held]);
+        }
         while batch.events.len() < EVENTS_PER_READ {
             self.line.clear();
             let limit = MAX_LINE_BYTES as u64 + 1;
@@ -82,7 +87,14 @@ impl CsvSource {
                 continue;
             }
             let event = self.layout.parse(line).map_err(|what| line_error(what, line))?;
-            batch.events.push(event);
+            match batch.events.push(event) {
+                Ok(()) => {}
+                Err(DoesNotFit::Time { .. }) => {
+                    self.held = Some(event);
+                    break;
+                }
+                Err(unfit @ DoesNotFit::Address { .. }) => return Err(line_error(unfit.to_string(), line)),
+            }
         }
         batch.reached = batch.events.last().map(|event| event.t);
         Ok(!batch.events.is_empty())

@@ -1,5 +1,6 @@
 //! Writes events as text.
 
+use std::borrow::Borrow;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -41,8 +42,9 @@ impl CsvWriter {
     ///
     /// # Errors
     /// [`RecordError::Write`] if the system refuses.
-    pub fn write(&mut self, events: &[Event]) -> Result<(), RecordError> {
-        let written = events.iter().try_for_each(|event| {
+    pub fn write(&mut self, events: impl IntoIterator<Item: Borrow<Event>>) -> Result<(), RecordError> {
+        let written = events.into_iter().try_for_each(|event| {
+            let event = event.borrow();
             writeln!(self.file, "{},{},{},{}", event.t.0, event.x, event.y, u8::from(event.polarity.is_on()))
         });
         written.map_err(|source| RecordError::Write { path: self.path.clone(), source })

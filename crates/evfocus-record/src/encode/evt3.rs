@@ -1,5 +1,7 @@
 //! Events as EVT 3.0 words (Prophesee, "EVT 3.0 Format").
 
+use std::borrow::Borrow;
+
 use evfocus_core::decode::Evt3Decoder;
 use evfocus_core::decode::evt3::{POLARITY_BIT, TIME_PERIOD_US, word_type};
 use evfocus_core::{CameraMicros, Event, Geometry, Polarity};
@@ -76,8 +78,12 @@ impl Evt3Encoder {
     ///
     /// # Errors
     /// An event that cannot be written; those before it have been, and the encoder can go on with others.
-    pub fn encode(&mut self, events: &[Event], out: &mut Vec<u8>) -> Result<(), EncodeError> {
-        let result = events.iter().try_for_each(|event| self.event(event, out));
+    pub fn encode(
+        &mut self,
+        events: impl IntoIterator<Item: Borrow<Event>>,
+        out: &mut Vec<u8>,
+    ) -> Result<(), EncodeError> {
+        let result = events.into_iter().try_for_each(|event| self.event(event.borrow(), out));
         self.flush_run(out);
         result
     }

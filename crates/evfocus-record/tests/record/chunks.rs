@@ -43,7 +43,7 @@ fn evt3_is_exact(path: &Path, geometry: Geometry, sizes: &[usize]) {
         decoder.decode(chunk, &mut batch);
         counter.count(chunk, |_, events| counted += events);
     });
-    exact(path, &batch.events, &expected, counted);
+    exact(path, &batch.events.to_vec(), &expected, counted);
     assert!(decoder.damage().is_none(), "{}: {:?}", path.display(), decoder.damage());
 }
 
@@ -56,7 +56,7 @@ fn davis_is_exact(path: &Path, sizes: &[usize]) {
         decoder.decode(chunk, &mut batch);
         counter.count(chunk, |_, events| counted += events);
     });
-    exact(path, &batch.events, &expected, counted);
+    exact(path, &batch.events.to_vec(), &expected, counted);
 }
 
 /// What others made of a recording, where that lies beside it as CSV; else what reading the file gives.

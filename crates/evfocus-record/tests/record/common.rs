@@ -18,7 +18,7 @@ pub(crate) fn read_all(recording: &mut Recording) -> Vec<Event> {
     let mut events = Vec::new();
     while recording.read(&mut batch).unwrap() {
         assert!(!batch.events.is_empty());
-        events.extend_from_slice(&batch.events);
+        events.extend(batch.events.iter());
     }
     assert_eq!(batch.events.capacity(), capacity, "the batch grew");
     events

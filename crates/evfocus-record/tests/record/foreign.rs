@@ -76,7 +76,7 @@ fn bare_words_are_read_if_their_format_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bare");
     let mut writer = Evt3Writer::create(&path, Geometry { width: 640, height: 480 }).unwrap();
-    writer.write(&[event(5, 1, 2, true)]).unwrap();
+    writer.write([event(5, 1, 2, true)]).unwrap();
     writer.finish().unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let header = bytes.windows(6).position(|window| window == b"% end\n").unwrap() + 6;

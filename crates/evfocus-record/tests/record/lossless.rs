@@ -132,14 +132,14 @@ fn evt3_takes_vectors_where_they_are_shorter() {
 fn evt3_refuses_what_it_cannot_express() {
     let mut encoder = Evt3Encoder::new(SENSOR).unwrap();
     let mut words = Vec::new();
-    encoder.encode(&[event(100, 0, 0, true)], &mut words).unwrap();
-    let outside = encoder.encode(&[event(100, 346, 0, true)], &mut words);
+    encoder.encode([event(100, 0, 0, true)], &mut words).unwrap();
+    let outside = encoder.encode([event(100, 346, 0, true)], &mut words);
     assert!(matches!(outside, Err(EncodeError::OutsideSensor { .. })));
-    let back = encoder.encode(&[event(99, 0, 0, true)], &mut words);
+    let back = encoder.encode([event(99, 0, 0, true)], &mut words);
     assert_eq!(back, Err(EncodeError::TimeReversal { time: 99, last: 100 }));
-    let late = encoder.encode(&[event(101 + Evt3Encoder::MAX_GAP_US, 0, 0, true)], &mut words);
+    let late = encoder.encode([event(101 + Evt3Encoder::MAX_GAP_US, 0, 0, true)], &mut words);
     assert_eq!(late, Err(EncodeError::GapTooLong { gap_us: Evt3Encoder::MAX_GAP_US + 1 }));
-    encoder.encode(&[event(101, 0, 0, true)], &mut words).unwrap();
+    encoder.encode([event(101, 0, 0, true)], &mut words).unwrap();
     let large = Evt3Encoder::new(Geometry { width: 2049, height: 1 });
     assert!(matches!(large, Err(EncodeError::SensorTooLarge { .. })));
 }
@@ -160,6 +160,6 @@ fn files_without_events() {
 #[test]
 fn a_full_disk_is_an_error_not_a_short_file() {
     let mut writer = Evt3Writer::create("/dev/full", SENSOR).unwrap();
-    writer.write(&[event(0, 0, 0, true)]).unwrap();
+    writer.write([event(0, 0, 0, true)]).unwrap();
     assert!(matches!(writer.finish(), Err(RecordError::Write { .. })));
 }

@@ -29,7 +29,7 @@ fn play(camera: &mut ReplayCamera, capacity: usize) -> (Vec<Event>, DeviceErrorK
     camera.start().unwrap();
     loop {
         match camera.read(&mut batch, Duration::from_millis(20)) {
-            Ok(()) => events.extend_from_slice(&batch.events),
+            Ok(()) => events.extend(batch.events.iter()),
             Err(error) => return (events, error.kind),
         }
     }
@@ -94,7 +94,7 @@ fn play_twice(events: &[Event]) -> Vec<Event> {
     let mut played = Vec::new();
     while played.len() < 2 * events.len() {
         camera.read(&mut batch, Duration::ZERO).unwrap();
-        played.extend_from_slice(&batch.events);
+        played.extend(batch.events.iter());
     }
     played
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use evfocus_core::{
-    Analyzer, Event, EventBatch, Geometry, HotPixels, LegReport, Question, SweepCapacity, SweepLimits,
+    Analyzer, EventBatch, Events, Geometry, HotPixels, LegReport, Question, SweepCapacity, SweepLimits,
     SweepRecorder, Windows,
 };
 use evfocus_record::{MAX_EVENTS_PER_READ, Recording};
@@ -77,28 +77,28 @@ struct Stage {
 
 impl Stage {
     /// Takes the events of `leg` out of `events`; returns those after it once there are any.
-    fn feed<'a>(&mut self, leg: &SweepLeg, events: &'a [Event]) -> Option<&'a [Event]> {
+    fn feed<'a>(&mut self, leg: &SweepLeg, events: Events<'a>) -> Option<Events<'a>> {
         // Not a binary search: a few events of a damaged recording may be out of order.
         let starts = events.iter().position(|event| event.t >= leg.start).unwrap_or(events.len());
-        let (before, from_start) = events.split_at(starts);
+        let (before, from_start) = (events.range(0..starts), events.from(starts));
         if !self.started
             && !self.hot_pixels_learnt
             && let Some(since) = leg.rest_since
         {
             let rested = before.iter().position(|event| event.t >= since).unwrap_or(before.len());
-            self.hot_pixels.observe(before.split_at(rested).1);
+            self.hot_pixels.observe(before.from(rested));
         }
         if from_start.is_empty() {
             return None;
         }
         self.start(leg);
         let ends = from_start.iter().position(|event| event.t >= leg.end);
-        let (inside, after) = from_start.split_at(ends.unwrap_or(from_start.len()));
+        let inside = from_start.range(0..ends.unwrap_or(from_start.len()));
         let hot_pixels = &self.hot_pixels;
         for run in inside.split(|event| hot_pixels.is_hot(event)) {
             self.recorder.feed(run);
         }
-        ends.map(|_| after)
+        ends.map(|ends| from_start.from(ends))
     }
 
     fn start(&mut self, leg: &SweepLeg) {

@@ -4,7 +4,7 @@ use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use evfocus_core::{CameraMicros, Event, Geometry, LensPosition};
+use evfocus_core::{CameraMicros, Events, Geometry, LensPosition};
 use evfocus_record::positions::PositionsWriter;
 use evfocus_record::{Aedat4Compression, Aedat4Writer, Evt3Writer, RecordError};
 
@@ -75,10 +75,10 @@ impl Files {
         })
     }
 
-    pub(super) fn write(&mut self, events: &[Event]) -> Result<(), RecordError> {
+    pub(super) fn write(&mut self, events: Events<'_>) -> Result<(), RecordError> {
         match &mut self.events {
-            EventFile::Evt3(writer) => writer.write(events),
-            EventFile::Aedat4(writer) => writer.write(events),
+            EventFile::Evt3(writer) => writer.write(events.iter()),
+            EventFile::Aedat4(writer) => writer.write(events.iter()),
         }
     }
 

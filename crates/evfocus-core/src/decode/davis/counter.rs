@@ -5,6 +5,7 @@ use super::{COLUMN_KIND, Word, special};
 use crate::decode::TimeRule;
 use crate::decode::bins::OpenBin;
 use crate::decode::framing::Framing;
+use crate::decode::runs::{BLOCK, bits};
 use crate::decode::vectorized::{TakeWords, take_words};
 use crate::units::CameraMicros;
 
@@ -45,8 +46,6 @@ impl DavisWordCounter {
     }
 }
 
-/// Words that are looked at together: as many as a number has bits.
-const BLOCK: usize = 64;
 /// A word without events and without time.
 const FILLER: [u8; 2] = 0x6000_u16.to_le_bytes();
 
@@ -71,13 +70,14 @@ impl State {
     /// Goes from one word of time to the next; the events between them are a number of bits.
     #[inline(always)]
     fn block(&mut self, block: &[[u8; 2]; BLOCK], out: &mut impl FnMut(CameraMicros, u64)) {
+        let block = &block.map(u16::from_le_bytes);
         let mut events = bits(block, |word| word >> 13 == COLUMN_KIND);
         let mut times = bits(block, tells_time);
         let (mut wraps_us, mut newest_us, mut end_us) = self.within_bin();
         while times != 0 {
             let index = times.trailing_zeros();
             times &= times - 1;
-            let word = block.get(index as usize).map_or(0, |&bytes| u16::from_le_bytes(bytes));
+            let word = block.get(index as usize).copied().unwrap_or_default();
             let time_us = wraps_us.saturating_add(i64::from(word & 0x7FFF));
             if (word & 0x8000 != 0) & (time_us >= newest_us) & (time_us < end_us) {
                 newest_us = time_us;
@@ -124,14 +124,4 @@ impl State {
 #[inline(always)]
 fn tells_time(word: u16) -> bool {
     (word & 0x8000 != 0) | (word >> 12 == 7) | (word == special::TIMESTAMP_RESET)
-}
-
-/// Bit i is what `test` says of word i.
-#[inline(always)]
-fn bits(block: &[[u8; 2]; BLOCK], test: impl Fn(u16) -> bool) -> u64 {
-    let flags = block.map(|bytes| u8::from(test(u16::from_le_bytes(bytes))));
-    let eights = flags.as_chunks::<8>().0.iter().enumerate();
-    // The factor moves the lowest bit of byte i to bit i of the highest byte.
-    let byte = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-    eights.fold(0, |bits, (index, eight)| bits | byte(eight) << (8 * index))
 }

@@ -3,7 +3,7 @@
 use crate::decode::{RESTART_LEAP_US, TimeRule};
 
 /// Microseconds until the 15 bits of a time word wrap.
-const TIME_PERIOD_US: i64 = 1 << 15;
+pub(super) const TIME_PERIOD_US: i64 = 1 << 15;
 
 /// The newest time, and what was wrong on the way to it.
 #[derive(Debug, Clone)]

@@ -38,6 +38,12 @@ impl Evt3Time {
         (self.high, self.period_start.saturating_add(i64::from(self.high) << 12))
     }
 
+    /// As [`low`](Self::low), for a time that is known not to fall.
+    #[inline]
+    pub(super) fn advance_to(&mut self, now: i64) {
+        self.now = Some(now);
+    }
+
     #[inline]
     pub(super) fn low(&mut self, low: u16) {
         let Some(now) = self.now else { return };
