@@ -13,8 +13,8 @@ const _: () = assert!(PADDED <= SPARE_ROOM, "decoding must not make a batch grow
 
 /// Bit i is what `test` says of word i.
 #[inline(always)]
-pub(super) fn bits(block: &[u16; BLOCK], test: impl Fn(u16) -> bool) -> u64 {
-    let flags = block.map(|word| u8::from(test(word)));
+pub(super) fn bits(block: &[[u8; 2]; BLOCK], test: impl Fn(u16) -> bool) -> u64 {
+    let flags = block.map(|bytes| u8::from(test(u16::from_le_bytes(bytes))));
     let eights = flags.as_chunks::<8>().0.iter().enumerate();
     // The factor moves the lowest bit of byte i to bit i of the highest byte.
     let byte = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
@@ -67,9 +67,9 @@ pub(super) fn decode_run(
 ) -> usize {
     let length = events.len();
     let count = words.len().min(BLOCK);
-    let mut block = [0; PADDED];
-    for (slot, &bytes) in block.iter_mut().zip(words.first_chunk::<BLOCK>().map_or(words, |full| full)) {
-        *slot = u16::from_le_bytes(bytes);
+    let mut block = [[0; 2]; PADDED];
+    for (slot, &word) in block.iter_mut().zip(words.first_chunk::<BLOCK>().map_or(words, |full| full)) {
+        *slot = word;
     }
     let singles = block.first_chunk().map_or(0, |words| bits(words, is_event));
     // What lies behind the words ends the run.
@@ -81,13 +81,14 @@ pub(super) fn decode_run(
         let mut run = next - start;
         while run > 0 {
             let (Some(from), Some(to)) = (stride(&block, start), stride_mut(places, written)) else { break };
-            *to = from.map(|word| event(*shared, word));
+            *to = from.map(|bytes| event(*shared, u16::from_le_bytes(bytes)));
             let step = run.min(STRIDE);
             run -= step;
             start += step;
             written += step;
         }
-        let Some(&word) = block.get(next).filter(|_| next < count) else { break next };
+        let Some(&bytes) = block.get(next).filter(|_| next < count) else { break next };
+        let word = u16::from_le_bytes(bytes);
         let kind = &kinds[usize::from(word >> 12)];
         let value = word & kind.mask;
         let changed = shared.changed(kind.keep, u64::from(value) << kind.shift, coarse);
@@ -103,7 +104,7 @@ pub(super) fn decode_run(
 }
 
 #[inline(always)]
-fn stride(block: &[u16; PADDED], start: usize) -> Option<&[u16; STRIDE]> {
+fn stride(block: &[[u8; 2]; PADDED], start: usize) -> Option<&[[u8; 2]; STRIDE]> {
     block.get(start..)?.first_chunk()
 }
 

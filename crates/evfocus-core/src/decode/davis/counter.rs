@@ -70,14 +70,13 @@ impl State {
     /// Goes from one word of time to the next; the events between them are a number of bits.
     #[inline(always)]
     fn block(&mut self, block: &[[u8; 2]; BLOCK], out: &mut impl FnMut(CameraMicros, u64)) {
-        let block = &block.map(u16::from_le_bytes);
         let mut events = bits(block, |word| word >> 13 == COLUMN_KIND);
         let mut times = bits(block, tells_time);
         let (mut wraps_us, mut newest_us, mut end_us) = self.within_bin();
         while times != 0 {
             let index = times.trailing_zeros();
             times &= times - 1;
-            let word = block.get(index as usize).copied().unwrap_or_default();
+            let word = block.get(index as usize).map_or(0, |&bytes| u16::from_le_bytes(bytes));
             let time_us = wraps_us.saturating_add(i64::from(word & 0x7FFF));
             if (word & 0x8000 != 0) & (time_us >= newest_us) & (time_us < end_us) {
                 newest_us = time_us;
