@@ -66,6 +66,24 @@ impl Hindrance {
         Self::Flicker,
     ];
 
+    /// Words for a table.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::None => "nothing",
+            Self::BlankWall => "a blank wall",
+            Self::Edge => "focus at an end of the range",
+            Self::LensStalled => "the lens does not move",
+            Self::LensUnplugged => "the lens is unplugged",
+            Self::LensSilent => "the lens falls silent",
+            Self::LatePositions => "positions 300 ms late",
+            Self::CameraUnplugged => "the camera is unplugged",
+            Self::ClockReset => "the camera's clock starts anew",
+            Self::EventsLost => "a third of the events is lost",
+            Self::Saturated => "a slow read-out",
+            Self::Flicker => "lamps that flicker",
+        }
+    }
+
     /// The reasons that tell the user of it.
     fn reasons(self) -> &'static [&'static str] {
         match self {
@@ -291,7 +309,7 @@ pub enum Verdict {
     FailedRightly,
     /// Failed with a reason that speaks of the scene, whatever was planted.
     GaveUp,
-    /// Wrong, and sure of it.
+    /// Off by more than three error bars.
     Wrong,
     /// Failed with a reason that misleads.
     Misled,
@@ -315,7 +333,7 @@ impl Verdict {
             Self::SaidToBeUncertain => "farther off, and said so",
             Self::FailedRightly => "failed, right reason",
             Self::GaveUp => "gave up on the scene",
-            Self::Wrong => "wrong, and sure of it",
+            Self::Wrong => "off by more than three error bars",
             Self::Misled => "failed, misleading reason",
         }
     }

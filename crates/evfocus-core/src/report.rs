@@ -311,7 +311,11 @@ impl fmt::Display for Failure {
                 "{lost} events were lost on the way, {counted} arrived: sweep slower or raise the thresholds"
             ),
             Self::Flicker { hz } => {
-                write!(f, "the events follow the {hz} Hz of the mains: use light that does not flicker")
+                write!(
+                    f,
+                    "the events follow the {hz} Hz of the mains: use light that does not flicker, or the filter of an EVK4 \
+                     (camera.anti_flicker_hz)"
+                )
             }
             Self::PeakAtEdge { position } => {
                 write!(f, "the sharpest position, {position}, is at the edge of the range: widen the range")

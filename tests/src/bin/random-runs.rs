@@ -38,19 +38,21 @@ fn main() -> Result<ExitCode> {
         let verdict = ended.verdict(trial);
         if matches!(verdict, Verdict::Wrong | Verdict::Misled) {
             sound = false;
-            let answer = ended.report.answer;
-            println!(
-                "- seed {seed}, {:?}: {}, {}, error {:.1?} ± {:.1?}, confidence {:.2?}",
-                trial.hindrance,
-                verdict.title(),
-                ended.reason(),
-                ended.error,
-                answer.and_then(|answer| answer.error_bar),
-                answer.and_then(|answer| answer.confidence),
-            );
+            println!("- seed {seed}, {} in the way: {}", trial.hindrance.title(), unsound(verdict, ended));
         }
     }
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::from(UNSOUND) })
+}
+
+/// What was wrong with a run.
+fn unsound(verdict: Verdict, ended: &Ended) -> String {
+    let answer = ended.report.answer.and_then(|answer| Some((answer.error_bar?, answer.confidence?)));
+    match (ended.error, answer) {
+        (Some(error), Some((bar, confidence))) => {
+            format!("{}: {error:+.1} counts, error bar {bar:.1}, confidence {confidence:.2}", verdict.title())
+        }
+        _ => format!("{}: {}", verdict.title(), ended.reason()),
+    }
 }
 
 fn dump(path: &str, runs: &[Run]) -> Result<()> {
@@ -60,7 +62,7 @@ fn dump(path: &str, runs: &[Run]) -> Result<()> {
         let answer = ended.report.answer;
         let line = serde_json::json!({
             "seed": seed,
-            "hindrance": format!("{:?}", trial.hindrance),
+            "hindrance": trial.hindrance.title(),
             "pace": trial.request.pace.map(Pace::name),
             "sensor": rig.sensor.model,
             "cutoff_hz": rig.sensor.cutoff_hz,
@@ -107,7 +109,7 @@ fn outcomes(runs: &[Run]) {
     }
     for (hindrance, row) in rows {
         let cells = row.map(|cell| cell.to_string()).join(" | ");
-        println!("| {hindrance:?} | {} | {cells} |", row.iter().sum::<usize>());
+        println!("| {} | {} | {cells} |", hindrance.title(), row.iter().sum::<usize>());
     }
     println!();
 }

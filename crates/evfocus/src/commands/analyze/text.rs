@@ -34,12 +34,12 @@ pub(super) fn print(analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::R
     let windows: Vec<_> = analysis.verdict.windows.iter().copied().map(parts_report::window).collect();
     print_windows(&windows, out)?;
     for sweep in &analysis.sweeps {
-        print_sweep(sweep, analysis.method, out)?;
+        print_sweep(sweep, analysis, out)?;
     }
     Ok(())
 }
 
-fn print_sweep(sweep: &SweepAnalysis, decides: Method, out: &mut Output) -> anyhow::Result<()> {
+fn print_sweep(sweep: &SweepAnalysis, analysis: &RecordingAnalysis, out: &mut Output) -> anyhow::Result<()> {
     let report = &sweep.report;
     writeln!(
         out,
@@ -50,14 +50,18 @@ fn print_sweep(sweep: &SweepAnalysis, decides: Method, out: &mut Output) -> anyh
         count(report.on + report.off),
         rate(report.peak_rate.0)
     )?;
-    if let Err(failure) = &sweep.verdict {
+    // What has been said of the whole need not be said again.
+    if let Err(failure) = &sweep.verdict
+        && analysis.verdict.outcome.as_ref().err() != Some(failure)
+    {
         writeln!(out, "  failed: {}: {failure}", failure.name())?;
     }
     if report.quality.has_flicker() && sweep.verdict.is_ok() {
         writeln!(out, "  many events follow the {} Hz of the mains", report.quality.flicker_hz)?;
     }
+    writeln!(out, "  each method on this sweep alone, the delay of the pixels still in it:")?;
     for method in Method::ALL {
-        let mark = if method == decides { '*' } else { ' ' };
+        let mark = if method == analysis.method { '*' } else { ' ' };
         match report.estimate(method) {
             Some(Ok(said)) => writeln!(
                 out,
