@@ -17,7 +17,7 @@ pub(crate) const SPARE_ROOM: usize = 72;
 
 /// Events in the order of the stream, eight bytes each.
 ///
-/// A list holds events up to 76 hours before and after its first one, in columns and rows up to [`LARGEST_ADDRESS`](crate::LARGEST_ADDRESS); others are
+/// A list holds events up to 12.7 days before and after its first one, in columns and rows up to [`LARGEST_ADDRESS`](crate::LARGEST_ADDRESS); others are
 /// refused, and it is for whoever fills the list to count them.
 #[derive(Debug, Clone, Default)]
 pub struct EventList {

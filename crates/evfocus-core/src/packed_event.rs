@@ -8,16 +8,18 @@
 use crate::event::{Event, Polarity};
 use crate::units::CameraMicros;
 
-const ADDRESS_BITS: u32 = 12;
-const POLARITY_SHIFT: u32 = 2 * ADDRESS_BITS;
+/// As many as the cameras' formats have.
+const ADDRESS_BITS: u32 = 11;
+/// Between column and row, where EVT 3.0 has it.
+const POLARITY_SHIFT: u32 = ADDRESS_BITS;
 const ADDRESS_MASK: u64 = (1 << ADDRESS_BITS) - 1;
-/// The farthest that a time may be from its list's origin, in the past and in the future: 76 hours.
+/// The farthest that a time may be from its list's origin, in the past and in the future: 12.7 days.
 const LONGEST_US: i64 = 1 << (63 - PackedEvent::TIME_SHIFT);
 
 /// The largest column and row that a list of events can hold. No event camera comes near it.
 pub const LARGEST_ADDRESS: u16 = ADDRESS_MASK as u16;
 
-/// An event of a list: from the lowest bit 12 bits of column, 12 of row, 1 of polarity, 39 of signed microseconds since its origin.
+/// An event of a list: from the lowest bit 11 bits of column, 1 of polarity, 11 of row, 41 of signed microseconds since its origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(transparent)]
 pub(crate) struct PackedEvent(u64);
@@ -27,10 +29,10 @@ impl PackedEvent {
     pub(crate) const COLUMN: u64 = ADDRESS_MASK;
     /// Bits of the row, and the lowest of them.
     pub(crate) const ROW: u64 = ADDRESS_MASK << Self::ROW_SHIFT;
-    pub(crate) const ROW_SHIFT: u32 = ADDRESS_BITS;
+    pub(crate) const ROW_SHIFT: u32 = POLARITY_SHIFT + 1;
     /// Bits of the time, and the lowest of them.
     pub(crate) const TIME: u64 = u64::MAX << Self::TIME_SHIFT;
-    pub(crate) const TIME_SHIFT: u32 = POLARITY_SHIFT + 1;
+    pub(crate) const TIME_SHIFT: u32 = Self::ROW_SHIFT + ADDRESS_BITS;
 
     /// An event `since` the origin, whose address is yet to be filled in.
     #[inline(always)]
@@ -137,7 +139,7 @@ pub enum DoesNotFit {
         y: u16,
     },
     /// It has to go into another list.
-    #[error("{time_us} us: a list that begins at {origin_us} us keeps events up to 76 hours from there")]
+    #[error("{time_us} us: a list that begins at {origin_us} us keeps events up to 12.7 days from there")]
     Time {
         /// Time of the event, microseconds.
         time_us: i64,

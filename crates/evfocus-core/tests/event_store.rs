@@ -3,16 +3,16 @@
 use evfocus_core::{CameraMicros, DoesNotFit, Event, EventList, EventStore, LARGEST_ADDRESS, Polarity};
 use proptest::prelude::*;
 
-const HOURS_76_US: i64 = 1 << 38;
+const DAYS_US: i64 = 1 << 40;
 
 fn event(t: i64, x: u16, y: u16) -> Event {
     Event { t: CameraMicros(t), x, y, polarity: Polarity::On }
 }
 
-/// Events within 76 hours of the first, wherever that is in time.
+/// Events within 12.7 days of the first, wherever that is in time.
 fn events() -> impl Strategy<Value = Vec<Event>> {
     let origins = prop_oneof![Just(0), Just(1_763_800_000_000_000_i64), Just(i64::MIN), Just(i64::MAX)];
-    let event = (-HOURS_76_US..HOURS_76_US, 0..=LARGEST_ADDRESS, 0..=LARGEST_ADDRESS, any::<bool>());
+    let event = (-DAYS_US..DAYS_US, 0..=LARGEST_ADDRESS, 0..=LARGEST_ADDRESS, any::<bool>());
     (origins, prop::collection::vec(event, 1..50)).prop_map(|(origin, events)| {
         let times = events.iter().map(|&(since, ..)| origin.saturating_add(since));
         let times: Vec<i64> = core::iter::once(origin).chain(times.skip(1)).collect();
@@ -65,10 +65,10 @@ fn what_does_not_fit_a_list_is_refused() {
         assert_eq!(list.push(event(7, x, y)), Err(DoesNotFit::Address { x, y }));
     }
     assert_eq!(list.push(event(100, 1, 2)), Ok(()));
-    for time_us in [100 + HOURS_76_US, 99 - HOURS_76_US, i64::MIN, i64::MAX] {
+    for time_us in [100 + DAYS_US, 99 - DAYS_US, i64::MIN, i64::MAX] {
         assert_eq!(list.push(event(time_us, 1, 2)), Err(DoesNotFit::Time { time_us, origin_us: 100 }));
     }
-    let kept = [event(100, 1, 2), event(99 + HOURS_76_US, 1, 2), event(100 - HOURS_76_US, 1, 2)];
+    let kept = [event(100, 1, 2), event(99 + DAYS_US, 1, 2), event(100 - DAYS_US, 1, 2)];
     assert_eq!(list.append(kept.into_iter().skip(1).chain([event(i64::MAX, 1, 2)])), 1);
     assert_eq!(list, kept);
     list.clear();

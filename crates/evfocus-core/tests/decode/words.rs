@@ -181,18 +181,18 @@ fn a_stream_of_zeros_is_no_events_and_no_time() {
     assert_eq!(davis.damage(), Damage { unknown_words: 1 << 19, ..Damage::default() });
 }
 
-/// 4096 wraps of 16.8 s are 19 hours, and a batch keeps what is within 76 hours of its first event.
+/// 65,536 wraps of 16.8 s are 12.7 days, and a batch keeps what is not farther from its first event.
 #[test]
 fn events_days_after_the_first_of_their_batch_are_lost_and_counted() {
     let mut words = vec![0x0001, 0x8000, 0x2001];
-    words.extend([0x8FFF, 0x8000].repeat(5 * 4096));
+    words.extend([0x8FFF, 0x8000].repeat(65_537));
     words.extend([0x2001, 0x2001, 0x3001, 0x4003]);
     let (batch, decoder) = evt3(&words);
     assert_eq!((batch.events, batch.lost), (EventList::of([event(0, 1, 1, false)]).unwrap(), 4));
     assert_eq!(decoder.damage().too_far_in_time, 4);
 
     let mut words = vec![0x8000, 0x1001, 0x2001];
-    words.extend([0x7FFF; 2050]);
+    words.extend([0x7FFF; 8200]);
     words.extend([0x2001, 0x2001]);
     let (batch, decoder) = davis(&words);
     assert_eq!((batch.events, batch.lost), (EventList::of([event(0, 1, 1, false)]).unwrap(), 2));
@@ -200,5 +200,5 @@ fn events_days_after_the_first_of_their_batch_are_lost_and_counted() {
     // The next batch begins anew.
     let (mut next, mut decoder) = (EventBatch::default(), decoder);
     decoder.decode(&bytes_of(&[0x2001]), &mut next);
-    assert_eq!(next.events, [event(2050 * (4095 << 15), 1, 1, false)]);
+    assert_eq!(next.events, [event(8200 * (4095 << 15), 1, 1, false)]);
 }
