@@ -1,6 +1,8 @@
 //! Counting the events of a DAVIS346's words without their coordinates.
 
-use super::time::DavisTime;
+use core::ops::Range;
+
+use super::time::{DavisTime, TIME_PERIOD_US};
 use super::{COLUMN_KIND, Word, special};
 use crate::decode::TimeRule;
 use crate::decode::bins::OpenBin;
@@ -46,6 +48,8 @@ impl DavisWordCounter {
     }
 }
 
+/// The word that tells time 0 since the last wrap.
+const TIME_WORD: u32 = 0x8000;
 /// A word without events and without time.
 const FILLER: [u8; 2] = 0x6000_u16.to_le_bytes();
 
@@ -72,17 +76,16 @@ impl State {
     fn block(&mut self, block: &[[u8; 2]; BLOCK], out: &mut impl FnMut(CameraMicros, u64)) {
         let mut events = bits(block, |word| word >> 13 == COLUMN_KIND);
         let mut times = bits(block, tells_time);
-        let (mut wraps_us, mut newest_us, mut end_us) = self.within_bin();
+        let mut steady = self.steady();
         while times != 0 {
             let index = times.trailing_zeros();
             times &= times - 1;
             let word = block.get(index as usize).map_or(0, |&bytes| u16::from_le_bytes(bytes));
-            let time_us = wraps_us.saturating_add(i64::from(word & 0x7FFF));
-            if (word & 0x8000 != 0) & (time_us >= newest_us) & (time_us < end_us) {
-                newest_us = time_us;
+            if steady.contains(&u32::from(word)) {
+                steady.start = u32::from(word);
                 continue;
             }
-            self.reach(newest_us);
+            self.reach(steady.start);
             let before = !(u64::MAX << index);
             if self.time.now().is_some() {
                 self.bin.add(u64::from((events & before).count_ones()));
@@ -97,24 +100,27 @@ impl State {
             if let Some(now) = self.time.now() {
                 self.bin.move_to(now, out);
             }
-            (wraps_us, newest_us, end_us) = self.within_bin();
+            steady = self.steady();
         }
-        self.reach(newest_us);
+        self.reach(steady.start);
         if self.time.now().is_some() {
             self.bin.add(u64::from(events.count_ones()));
         }
     }
 
-    /// What a time word is added to, and from when until when that stays in the open bin and does not fall.
-    fn within_bin(&self) -> (i64, i64, i64) {
-        let newest_us = self.time.now().unwrap_or(i64::MAX);
-        (self.time.wraps_us(), newest_us, self.bin.range().1)
+    /// The time words that do not fall and stay in the open bin: the first is that of the newest time. None before there is a time.
+    fn steady(&self) -> Range<u32> {
+        let word = |time_us: i64| {
+            TIME_WORD + time_us.saturating_sub(self.time.wraps_us()).clamp(0, TIME_PERIOD_US) as u32
+        };
+        word(self.time.now().unwrap_or(i64::MAX))..word(self.bin.range().1)
     }
 
-    /// Takes note of a time that followed the newest one.
-    fn reach(&mut self, newest_us: i64) {
-        if self.time.now().is_some() {
-            self.time.advance_to(newest_us);
+    /// Takes note of the newest time word, if there has been a time.
+    fn reach(&mut self, word: u32) {
+        // Of a time that no word tells the clamped one is no news.
+        if self.time.now().is_some() && word < TIME_WORD + TIME_PERIOD_US as u32 {
+            self.time.advance_to(self.time.wraps_us() + i64::from(word - TIME_WORD));
         }
     }
 }
