@@ -192,7 +192,7 @@ fn events_days_after_the_first_of_their_batch_are_lost_and_counted() {
     assert_eq!(decoder.damage().too_far_in_time, 4);
 
     let mut words = vec![0x8000, 0x1001, 0x2001];
-    words.extend([0x7FFF; 8200]);
+    words.extend([0x7FFF].repeat(8200));
     words.extend([0x2001, 0x2001]);
     let (batch, decoder) = davis(&words);
     assert_eq!((batch.events, batch.lost), (EventList::of([event(0, 1, 1, false)]).unwrap(), 2));
