@@ -4,6 +4,9 @@
 //! Each sample is one reading, dated by its question and its answer, and one step of the loop. A lens that is not asked for
 //! 20 ms is steered badly. The outputs keep their voltage if the host dies; the motor is stopped when the driver is dropped;
 //! against worse, set up the device's own watchdog, or put end switches into the motor's stage.
+//!
+//! A stop is written before the answer to a reading under way has come; answers carry their question's number. Whether every
+//! firmware takes a second question then is not known, so it is written once more after the answer.
 
 pub mod protocol;
 
@@ -11,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{LensPosition, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 use crate::Port;
 use crate::drive::DriveConfig;
@@ -72,10 +75,7 @@ impl LabJack {
             return Ok(());
         }
         let greeted = self.greet();
-        if greeted.is_err() {
-            self.rate.line.close();
-        }
-        greeted
+        self.rate.line.greeted(greeted)
     }
 
     fn greet(&mut self) -> Result<(), DeviceError> {
@@ -106,14 +106,16 @@ impl LabJack {
     fn read(&mut self, register: u16) -> Result<Timed<[u8; 4]>, DeviceError> {
         let transaction = self.next_transaction();
         let question = protocol::read(transaction, register);
-        self.rate.line.ask(&question, USUAL, |bytes| protocol::value(transaction, bytes))
+        self.rate.line.ask(&question, USUAL, move |bytes| protocol::value(transaction, bytes))
     }
 
     fn write(&mut self, volts: [f32; 2]) -> Result<(), DeviceError> {
         let transaction = self.next_transaction();
         let question = protocol::write(transaction, protocol::OUTPUTS, &volts);
-        self.rate.line.ask(&question, USUAL, |bytes| protocol::written(transaction, bytes))?;
+        // Even if the answer is missed.
         self.output = volts;
+        self.rate.line.hurry(&question)?;
+        self.rate.line.ask(&question, USUAL, move |bytes| protocol::written(transaction, bytes))?;
         Ok(())
     }
 
@@ -161,6 +163,10 @@ impl Lens for LabJack {
         self.rate.info(&self.serial)
     }
 
+    fn listen(&mut self, bell: &Bell) {
+        self.rate.line.listen(bell);
+    }
+
     fn home(&mut self) -> Result<(), DeviceError> {
         Ok(())
     }
@@ -179,8 +185,10 @@ impl Lens for LabJack {
 
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         self.ready()?;
-        self.steer().inspect_err(|_| {
-            if let Err(error) = self.cut() {
+        self.steer().inspect_err(|fault| {
+            if !fault.is_interruption()
+                && let Err(error) = self.cut()
+            {
                 tracing::error!(%error, "the motor could not be cut off");
             }
         })

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::line::{Line, Patience};
@@ -166,10 +166,7 @@ struct Greeting {
 fn greet(line: &mut Line, quantity: Quantity) -> Result<Greeting, DeviceError> {
     line.open()?;
     let greeting = introduce(line, quantity);
-    if greeting.is_err() {
-        line.close();
-    }
-    greeting
+    line.greeted(greeting)
 }
 
 fn introduce(line: &mut Line, quantity: Quantity) -> Result<Greeting, DeviceError> {
@@ -220,6 +217,10 @@ impl Lens for Optotune {
             speed_is_share: false,
             needs_homing: false,
         }
+    }
+
+    fn listen(&mut self, bell: &Bell) {
+        self.line.listen(bell);
     }
 
     fn home(&mut self) -> Result<(), DeviceError> {

@@ -15,7 +15,7 @@ use crate::bench::{Bench, says, stands};
 
 const SPEED: f64 = 900.0;
 
-fn motor() -> LensConfig {
+pub(crate) fn motor() -> LensConfig {
     LensConfig {
         max_speed: LensSpeed::new(SPEED).unwrap(),
         start: LensPosition(1000.0),
@@ -37,7 +37,7 @@ pub(crate) fn drive() -> DriveConfig {
     }
 }
 
-fn config() -> FirmataConfig {
+pub(crate) fn config() -> FirmataConfig {
     FirmataConfig { pwm_pin: 3, direction_pin: 4, channel: 0, drive: drive() }
 }
 

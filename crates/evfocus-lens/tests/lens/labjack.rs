@@ -13,7 +13,7 @@ use hil_sim::wire::{Protocol, Server, WireFault};
 use crate::bench::{Bench, says, stands};
 use crate::firmata::drive;
 
-fn motor() -> LensConfig {
+pub(crate) fn motor() -> LensConfig {
     LensConfig {
         max_speed: drive().max_speed,
         start: LensPosition(1000.0),
@@ -23,7 +23,7 @@ fn motor() -> LensConfig {
     }
 }
 
-fn config() -> LabJackConfig {
+pub(crate) fn config() -> LabJackConfig {
     LabJackConfig {
         channel: 0,
         reference_volts: 5.0,
