@@ -129,7 +129,7 @@ impl Firmata {
             self.rate.line.send(&command.encode())?;
         }
         let sample = self.reading()?;
-        self.rate.begin_at(&sample);
+        self.rate.begin_at(&sample, self.board.full_reading);
         tracing::info!(
             port = self.rate.line.place(), version = ?version, reading_bits, duty_bits, position = %sample.position, "Firmata board"
         );

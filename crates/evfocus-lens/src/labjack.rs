@@ -27,6 +27,9 @@ pub const PORT: u16 = 502;
 /// An exchange takes 1 ms on Ethernet, 7 ms over WiFi. All attempts together are how long a motor runs on unwatched.
 const USUAL: Patience = Patience { timeout: Duration::from_millis(30), attempts: 3 };
 
+/// Steps of a T4's converter, 12 bits; the others have 16 and more.
+const FULL_READING: f64 = 4095.0;
+
 /// What the protocol does not tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LabJackConfig {
@@ -91,7 +94,7 @@ impl LabJack {
         let product = f32::from_be_bytes(self.read(protocol::PRODUCT)?.value);
         self.serial = u32::from_be_bytes(self.read(protocol::SERIAL)?.value).to_string();
         let sample = self.reading()?;
-        self.rate.begin_at(&sample);
+        self.rate.begin_at(&sample, FULL_READING);
         tracing::info!(
             address = self.rate.line.place(), product, serial = self.serial, position = %sample.position, "LabJack"
         );
