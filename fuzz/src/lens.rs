@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, Transport, VirtualClock};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, Transport, VirtualClock};
 use evfocus_lens::Port;
 use evfocus_lens::drive::DriveConfig;
 use hil_sim::LensConfig;
@@ -22,6 +22,7 @@ type Data = Arc<Mutex<VecDeque<u8>>>;
 struct Spoilt {
     inner: Box<dyn Transport>,
     data: Data,
+    bell: Bell,
 }
 
 fn take(data: &Data) -> Option<u8> {
@@ -63,9 +64,18 @@ impl Transport for Spoilt {
                 }
                 Ok(length)
             }
+            // or an order comes before it,
+            Some(252..=253) => {
+                self.bell.ring();
+                Ok(0)
+            }
             // or nothing ever again.
-            Some(252..) => Err(gone()),
+            Some(254..) => Err(gone()),
         }
+    }
+
+    fn listen(&mut self, bell: &Bell) {
+        self.inner.listen(bell);
     }
 
     fn drain(&mut self) -> Result<(), DeviceError> {
@@ -83,17 +93,20 @@ pub fn fuzz<L: Lens>(
     let shared: Arc<dyn Clock> = clock.clone();
     let wire = WirePort::with_a_motor(protocol, LensConfig::default(), Arc::clone(&shared));
     let data: Data = Arc::new(Mutex::new(data.iter().copied().collect()));
-    let line = Arc::clone(&data);
+    let (line, bell) = (Arc::clone(&data), Bell::default());
+    let rope = bell.clone();
     let connect = move || -> Result<Box<dyn Transport>, DeviceError> {
-        Ok(Box::new(Spoilt { inner: wire.open()?, data: Arc::clone(&line) }))
+        Ok(Box::new(Spoilt { inner: wire.open()?, data: Arc::clone(&line), bell: rope.clone() }))
     };
     let began = clock.now();
     let lens = open(Port::new("spoilt", Box::new(connect)), Arc::clone(&shared));
     check_time(began, clock.now(), "opening");
     let Ok(mut lens) = lens else { return };
+    lens.listen(&bell);
     for _ in 0..CALLS {
         let Some(call) = take(&data) else { return };
         let began = clock.now();
+        bell.hush();
         match call % 8 {
             0..=3 => {
                 if let Ok(sample) = lens.sample() {

@@ -14,6 +14,8 @@ pub enum DeviceErrorKind {
     Busy,
     /// The device did not answer in time.
     TimedOut,
+    /// The [`Bell`](crate::Bell) rang while the call waited for the device: nothing is wrong, call again when there is time.
+    Interrupted,
     /// The device said something that its protocol does not allow.
     Protocol,
     /// A request outside of the device's range.
@@ -31,6 +33,7 @@ impl fmt::Display for DeviceErrorKind {
             Self::PermissionDenied => "permission denied",
             Self::Busy => "in use by another program",
             Self::TimedOut => "no answer in time",
+            Self::Interrupted => "interrupted",
             Self::Protocol => "protocol violation",
             Self::OutOfRange => "out of range",
             Self::NotStarted => "not started",
@@ -52,6 +55,11 @@ pub struct DeviceError {
 }
 
 impl DeviceError {
+    /// Whether nothing is wrong, but somebody rang.
+    pub fn is_interruption(&self) -> bool {
+        self.kind == DeviceErrorKind::Interrupted
+    }
+
     /// An error of `kind` on `device`.
     pub fn new(kind: DeviceErrorKind, device: impl Into<String>, what: impl Into<String>) -> Self {
         Self { kind, device: device.into(), what: what.into() }

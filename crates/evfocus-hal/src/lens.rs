@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use evfocus_core::{LensPosition, LensRange, LensSample, LensSpeed};
 
-use crate::DeviceError;
+use crate::{Bell, DeviceError};
 
 /// Who moves a lens, and how its position is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -63,6 +63,11 @@ pub struct LensInfo {
 pub trait Lens: Send {
     /// What the lens is.
     fn info(&self) -> LensInfo;
+
+    /// Ends the waits of later calls while `bell` rings, so that an order need not wait for the answer to an earlier question: a call that
+    /// waits then ends with [`DeviceErrorKind::Interrupted`](crate::DeviceErrorKind::Interrupted). What it had sent stays sent; an
+    /// order that ends so is not done and must be given again, or another one. Lenses that do not wait need not listen.
+    fn listen(&mut self, _bell: &Bell) {}
 
     /// Starts to find the reference position. A lens that needs none does nothing.
     fn home(&mut self) -> Result<(), DeviceError>;

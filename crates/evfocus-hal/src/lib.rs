@@ -4,6 +4,7 @@
 //! Not their job: deciding anything. Implementations know neither each other nor the daemon. Each is put through
 //! [`conformance`] by its own tests.
 
+mod bell;
 mod camera;
 mod clock;
 pub mod conformance;
@@ -12,6 +13,7 @@ mod lens;
 mod transport;
 pub mod usb;
 
+pub use bell::Bell;
 pub use camera::{Camera, CameraInfo};
 pub use clock::{Clock, SystemClock, VirtualClock, unix_time};
 pub use error::{DeviceError, DeviceErrorKind};

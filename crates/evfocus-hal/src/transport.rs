@@ -2,7 +2,7 @@
 
 use evfocus_core::HostMicros;
 
-use crate::DeviceError;
+use crate::{Bell, DeviceError};
 
 /// An open connection that carries bytes both ways. Protocols are written against this; what is behind it does not matter to
 /// them.
@@ -22,6 +22,9 @@ pub trait Transport: Send {
     /// # Errors
     /// [`DeviceErrorKind::Disconnected`](crate::DeviceErrorKind::Disconnected), as for [`write`](Self::write).
     fn read(&mut self, buffer: &mut [u8], deadline: HostMicros) -> Result<usize, DeviceError>;
+
+    /// From now on [`read`](Self::read) returns at once, if nothing has come in, while `bell` rings.
+    fn listen(&mut self, bell: &Bell);
 
     /// Throws away what has come in and was not read: late answers to earlier questions.
     ///

@@ -23,6 +23,8 @@ const LONGEST_LEAD: f64 = 0.15;
 const SETTLING: f64 = 1.0;
 /// It has settled when it has stayed there undriven for this long, seconds.
 const SETTLED: f64 = 0.03;
+/// It is driven until it is this near to its target, as a share of the tolerance, so that noise does not carry it out again.
+const AIM: f64 = 0.5;
 /// A motor may swallow this much of its fastest way before it moves, seconds: inertia, and play before the potentiometer.
 const SWALLOWED: f64 = 0.1;
 
@@ -141,6 +143,8 @@ impl Progress {
 #[derive(Debug)]
 pub(crate) struct Drive {
     config: DriveConfig,
+    /// How near to its target the lens is driven, counts.
+    aim: f64,
     state: State,
     readings: [f64; READINGS],
     count: usize,
@@ -149,7 +153,13 @@ pub(crate) struct Drive {
 
 impl Drive {
     pub(crate) fn new(config: DriveConfig) -> Self {
-        Self { config, state: State::Rest, readings: [0.0; READINGS], count: 0, last: None }
+        let aim = AIM * config.tolerance;
+        Self { config, aim, state: State::Rest, readings: [0.0; READINGS], count: 0, last: None }
+    }
+
+    /// The readings have steps of so many counts. Their noise tells something of what lies between the steps, but not much.
+    pub(crate) fn set_resolution(&mut self, step: f64) {
+        self.aim = (AIM * self.config.tolerance).max(step.abs() / 4.0).min(self.config.tolerance);
     }
 
     pub(crate) fn config(&self) -> &DriveConfig {
@@ -228,11 +238,15 @@ impl Drive {
             }
             State::Settling { target, mut progress, since, near_since } => {
                 let error = target - position;
-                if error.abs() <= config.tolerance {
+                let near = if near_since.is_some() { config.tolerance } else { self.aim };
+                if error.abs() <= near {
                     let near_since = near_since.unwrap_or(now);
                     let has_settled = now.since(near_since).as_secs_f64() >= SETTLED;
-                    let still = State::Settling { target, progress, since, near_since: Some(near_since) };
-                    self.state = if has_settled { State::Rest } else { still };
+                    // It may have run on; then it is driven again.
+                    let near_since = Some(near_since).filter(|_| !has_settled);
+                    let is_there = has_settled && error.abs() <= self.aim;
+                    let settling = State::Settling { target, progress, since, near_since };
+                    self.state = if is_there { State::Rest } else { settling };
                     return Ok(0.0);
                 }
                 let speed = GAIN * error;

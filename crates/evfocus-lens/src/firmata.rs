@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 use crate::Port;
 use crate::drive::DriveConfig;
@@ -86,10 +86,7 @@ impl Firmata {
         }
         self.decoder = Decoder::default();
         let greeted = self.greet();
-        if greeted.is_err() {
-            self.rate.line.close();
-        }
-        greeted
+        self.rate.line.greeted(greeted)
     }
 
     fn greet(&mut self) -> Result<(), DeviceError> {
@@ -132,7 +129,7 @@ impl Firmata {
             self.rate.line.send(&command.encode())?;
         }
         let sample = self.reading()?;
-        self.rate.begin_at(&sample);
+        self.rate.begin_at(&sample, self.board.full_reading);
         tracing::info!(
             port = self.rate.line.place(), version = ?version, reading_bits, duty_bits, position = %sample.position, "Firmata board"
         );
@@ -237,6 +234,10 @@ impl Lens for Firmata {
         self.rate.info(self.rate.line.place())
     }
 
+    fn listen(&mut self, bell: &Bell) {
+        self.rate.line.listen(bell);
+    }
+
     fn home(&mut self) -> Result<(), DeviceError> {
         Ok(())
     }
@@ -256,7 +257,9 @@ impl Lens for Firmata {
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         self.ready()?;
         let steered = self.steer();
-        if let Err(fault) = &steered {
+        if let Err(fault) = &steered
+            && !fault.is_interruption()
+        {
             if let Err(error) = self.cut() {
                 tracing::error!(%error, "the motor could not be cut off");
             }

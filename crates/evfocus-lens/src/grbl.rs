@@ -4,6 +4,9 @@
 //! offset matters. A jog can be ended at any time without losing count; it is ended when the driver is dropped. If the host
 //! dies, a jog goes on to its target, which lies within the limits of the configuration.
 //!
+//! The firmware hears while it speaks: bytes that act at once are picked out as they arrive, lines wait in its buffer. So an order
+//! is written before a status report under way has come, and reports are told from acknowledgements by their form.
+//!
 //! Grbl's paper advises to ask for the status 5 times a second, 10 at most, for the processor's sake; measured on a simulated
 //! processor it stands 100. The pace is the caller's.
 
@@ -14,7 +17,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::continuity::Continuity;
@@ -83,6 +86,8 @@ pub struct Grbl {
     /// Machine minus work coordinates, for controllers that report work coordinates.
     offset: [f64; 3],
     motion: Motion,
+    /// Until when a report that was asked for may still come.
+    asked: Option<HostMicros>,
     last_steps: f64,
     continuity: Continuity,
 }
@@ -96,7 +101,8 @@ impl Grbl {
         let mut line = Line::new("GRBL controller", port, clock);
         let mut lines = Lines::default();
         line.open()?;
-        let (steps_per_mm, max_speed) = greet(&mut line, &mut lines, &config)?;
+        let greeted = greet(&mut line, &mut lines, &config);
+        let (steps_per_mm, max_speed) = line.greeted(greeted)?;
         Ok(Self {
             line,
             lines,
@@ -105,6 +111,7 @@ impl Grbl {
             max_speed,
             offset: [0.0; 3],
             motion: Motion::Rest,
+            asked: None,
             last_steps: 0.0,
             continuity: Continuity::new(config.range, max_speed),
         })
@@ -118,16 +125,10 @@ impl Grbl {
         self.lines = Lines::default();
         self.motion = Motion::Rest;
         self.continuity.forget();
-        match greet(&mut self.line, &mut self.lines, &self.config) {
-            Ok((steps_per_mm, max_speed)) => {
-                (self.steps_per_mm, self.max_speed) = (steps_per_mm, max_speed);
-                Ok(())
-            }
-            Err(error) => {
-                self.line.close();
-                Err(error)
-            }
-        }
+        self.asked = None;
+        let greeted = greet(&mut self.line, &mut self.lines, &self.config);
+        (self.steps_per_mm, self.max_speed) = self.line.greeted(greeted)?;
+        Ok(())
     }
 
     /// Asks where the axis is.
@@ -135,10 +136,12 @@ impl Grbl {
         let (patience, attempts) =
             if self.motion == Motion::Rest { (ANSWER, ATTEMPTS) } else { (MOVING_ANSWER, MOVING_ATTEMPTS) };
         for _ in 0..attempts {
+            self.settle(patience)?;
             self.heed_waiting()?;
             let requested = self.line.now();
             self.line.send(&[protocol::STATUS])?;
             let deadline = self.line.now() + patience;
+            self.asked = Some(deadline);
             while let Some(message) = next(&mut self.line, &mut self.lines, deadline)? {
                 if let Message::Status { state, machine, work, offset } = message {
                     self.offset = offset.unwrap_or(self.offset);
@@ -147,15 +150,29 @@ impl Grbl {
                     let Some(mm) = machine.map(|machine| protocol::of(axis, machine)).or(of_work) else {
                         continue;
                     };
+                    self.asked = None;
                     let value = Report { state, steps: mm * self.steps_per_mm };
                     return Ok(Timed { requested, replied: self.line.now(), value });
                 }
                 self.heed(message)?;
             }
+            self.asked = None;
         }
         let what =
             format!("no status report within {patience:?}, asked {attempts} times; check power and cable");
         Err(self.line.error(DeviceErrorKind::TimedOut, what))
+    }
+
+    /// Waits for the report that was left open for an order: the next one must not be taken for it.
+    fn settle(&mut self, patience: Duration) -> Result<(), DeviceError> {
+        let limit = self.line.now() + patience;
+        while let Some(deadline) = self.asked {
+            match next(&mut self.line, &mut self.lines, deadline.min(limit))? {
+                Some(message) => self.heed(message)?,
+                None => self.asked = None,
+            }
+        }
+        Ok(())
     }
 
     /// Heeds what has come in by itself; late reports among it are of no use.
@@ -173,7 +190,11 @@ impl Grbl {
             Message::Alarm(code) => format!("ALARM:{code}: {}", protocol::alarm_text(code)),
             Message::Error(code) => format!("error:{code}: {}", protocol::error_text(code)),
             Message::Banner => "it was reset, and its count with it; home it, or set its position".to_owned(),
-            Message::Ok | Message::Status { .. } | Message::Setting(..) | Message::Other => return Ok(()),
+            Message::Status { .. } => {
+                self.asked = None;
+                return Ok(());
+            }
+            Message::Ok | Message::Setting(..) | Message::Other => return Ok(()),
         };
         self.motion = Motion::Rest;
         Err(self.line.error(DeviceErrorKind::Fault, what))
@@ -260,6 +281,10 @@ impl Lens for Grbl {
         }
     }
 
+    fn listen(&mut self, bell: &Bell) {
+        self.line.listen(bell);
+    }
+
     fn home(&mut self) -> Result<(), DeviceError> {
         if !self.config.needs_homing {
             return Ok(());
@@ -293,7 +318,7 @@ impl Lens for Grbl {
             return self.line.send(&[protocol::JOG_CANCEL]);
         }
         self.line.send(&[protocol::SOFT_RESET])?;
-        self.motion = Motion::Rest;
+        (self.motion, self.asked) = (Motion::Rest, None);
         // Its greeting is expected here, and news anywhere else.
         let deadline = self.line.now() + ANSWER;
         while let Some(message) = next(&mut self.line, &mut self.lines, deadline)? {
@@ -313,7 +338,7 @@ impl Lens for Grbl {
             return Ok(sample);
         }
         let report = self.report();
-        if report.is_err() && self.line.is_open() {
+        if report.as_ref().is_err_and(|error| !error.is_interruption()) && self.line.is_open() {
             // It may hear what it does not answer.
             self.line.send(&[protocol::JOG_CANCEL])?;
         }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::continuity::Continuity;
@@ -214,6 +214,10 @@ impl Lens for Indi {
             speed_is_share: self.config.set_speed,
             needs_homing: false,
         }
+    }
+
+    fn listen(&mut self, bell: &Bell) {
+        self.session.line.listen(bell);
     }
 
     fn home(&mut self) -> Result<(), DeviceError> {

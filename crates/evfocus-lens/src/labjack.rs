@@ -4,6 +4,9 @@
 //! Each sample is one reading, dated by its question and its answer, and one step of the loop. A lens that is not asked for
 //! 20 ms is steered badly. The outputs keep their voltage if the host dies; the motor is stopped when the driver is dropped;
 //! against worse, set up the device's own watchdog, or put end switches into the motor's stage.
+//!
+//! A stop is written before the answer to a reading under way has come; answers carry their question's number. Whether every
+//! firmware takes a second question then is not known, so it is written once more after the answer.
 
 pub mod protocol;
 
@@ -11,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{LensPosition, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensInfo};
 
 use crate::Port;
 use crate::drive::DriveConfig;
@@ -23,6 +26,9 @@ pub const PORT: u16 = 502;
 
 /// An exchange takes 1 ms on Ethernet, 7 ms over WiFi. All attempts together are how long a motor runs on unwatched.
 const USUAL: Patience = Patience { timeout: Duration::from_millis(30), attempts: 3 };
+
+/// Steps of a T4's converter, 12 bits; the others have 16 and more.
+const FULL_READING: f64 = 4095.0;
 
 /// What the protocol does not tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,10 +78,7 @@ impl LabJack {
             return Ok(());
         }
         let greeted = self.greet();
-        if greeted.is_err() {
-            self.rate.line.close();
-        }
-        greeted
+        self.rate.line.greeted(greeted)
     }
 
     fn greet(&mut self) -> Result<(), DeviceError> {
@@ -91,7 +94,7 @@ impl LabJack {
         let product = f32::from_be_bytes(self.read(protocol::PRODUCT)?.value);
         self.serial = u32::from_be_bytes(self.read(protocol::SERIAL)?.value).to_string();
         let sample = self.reading()?;
-        self.rate.begin_at(&sample);
+        self.rate.begin_at(&sample, FULL_READING);
         tracing::info!(
             address = self.rate.line.place(), product, serial = self.serial, position = %sample.position, "LabJack"
         );
@@ -106,14 +109,16 @@ impl LabJack {
     fn read(&mut self, register: u16) -> Result<Timed<[u8; 4]>, DeviceError> {
         let transaction = self.next_transaction();
         let question = protocol::read(transaction, register);
-        self.rate.line.ask(&question, USUAL, |bytes| protocol::value(transaction, bytes))
+        self.rate.line.ask(&question, USUAL, move |bytes| protocol::value(transaction, bytes))
     }
 
     fn write(&mut self, volts: [f32; 2]) -> Result<(), DeviceError> {
         let transaction = self.next_transaction();
         let question = protocol::write(transaction, protocol::OUTPUTS, &volts);
-        self.rate.line.ask(&question, USUAL, |bytes| protocol::written(transaction, bytes))?;
+        // Even if the answer is missed.
         self.output = volts;
+        self.rate.line.hurry(&question)?;
+        self.rate.line.ask(&question, USUAL, move |bytes| protocol::written(transaction, bytes))?;
         Ok(())
     }
 
@@ -161,6 +166,10 @@ impl Lens for LabJack {
         self.rate.info(&self.serial)
     }
 
+    fn listen(&mut self, bell: &Bell) {
+        self.rate.line.listen(bell);
+    }
+
     fn home(&mut self) -> Result<(), DeviceError> {
         Ok(())
     }
@@ -179,8 +188,10 @@ impl Lens for LabJack {
 
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         self.ready()?;
-        self.steer().inspect_err(|_| {
-            if let Err(error) = self.cut() {
+        self.steer().inspect_err(|fault| {
+            if !fault.is_interruption()
+                && let Err(error) = self.cut()
+            {
                 tracing::error!(%error, "the motor could not be cut off");
             }
         })

@@ -4,6 +4,11 @@
 //! firmwares agree on. Their quirks are expected: `#` after the version or not, an early start at `SN`, a "moving" that is
 //! late, a reset by opening the port.
 //!
+//! An order does not wait for the answer to a question: `FQ`, and what sets speed and target, are written while it comes. Whether every
+//! firmware hears while it speaks is not known, small ones may not; so they are written once more when the answer is in. `FG` goes out
+//! when the target has been read back, an exchange later. At 9600 baud the question's own bytes are on the line for 4 ms, which no order
+//! can overtake.
+//!
 //! The position is a count: play and lost steps are invisible to it. The protocol knows no limits, so the range comes from the
 //! configuration. If the host dies, the motor goes on to its target and stays there.
 
@@ -13,7 +18,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::continuity::Continuity;
@@ -98,10 +103,7 @@ impl MoonLite {
         (self.motion, self.told) = (Motion::Rest, None);
         self.continuity.forget();
         let greeted = self.greet();
-        if greeted.is_err() {
-            self.line.close();
-        }
-        greeted
+        self.line.greeted(greeted)
     }
 
     fn greet(&mut self) -> Result<(), DeviceError> {
@@ -178,6 +180,7 @@ impl MoonLite {
     /// Nothing acknowledges a target, so it is read back.
     fn set_target(&mut self, target: u32) -> Result<(), DeviceError> {
         let mut heard = 0;
+        self.told = None;
         for _ in 0..USUAL.attempts {
             self.line.send(&Command::SetTarget(target).encode())?;
             heard = self.line.ask(&Command::Target.encode(), USUAL, protocol::position)?.value;
@@ -219,6 +222,10 @@ impl Lens for MoonLite {
         }
     }
 
+    fn listen(&mut self, bell: &Bell) {
+        self.line.listen(bell);
+    }
+
     fn home(&mut self) -> Result<(), DeviceError> {
         Ok(())
     }
@@ -248,6 +255,9 @@ impl Lens for MoonLite {
 
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         let sample = self.ready().and_then(|()| self.look());
+        if sample.as_ref().is_err_and(DeviceError::is_interruption) {
+            return sample;
+        }
         self.in_doubt = sample.is_err();
         if sample.is_err() && self.motion != Motion::Rest && self.line.is_open() {
             // It may hear what it does not answer.
@@ -261,7 +271,7 @@ impl Lens for MoonLite {
 impl Drop for MoonLite {
     fn drop(&mut self) {
         if self.line.is_open()
-            && let Err(error) = self.line.send(&Command::Stop.encode())
+            && let Err(error) = self.line.send(&Command::Stop.encode()).and_then(|()| self.line.settle())
         {
             tracing::warn!(%error, "the lens could not be stopped");
         }

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::{HostMicros, LensPosition, LensRange, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Lens, LensClass, LensInfo};
 
 use crate::Port;
 use crate::line::{Line, Patience};
@@ -31,6 +31,9 @@ pub const BAUD: u32 = 115_200;
 const USUAL: Patience = Patience { timeout: Duration::from_millis(100), attempts: 3 };
 /// The driver wakes up with its port.
 const GREETING: Patience = Patience { timeout: Duration::from_millis(500), attempts: 3 };
+/// How often the set-point of a moving lens is read back. Question and answer take as long as three set-points: with each of them, the
+/// steps would be so coarse that the glass swings with their rhythm.
+const READ_BACK: Duration = Duration::from_millis(10);
 /// However seldom the samples come, a step is no longer than the way of this time.
 const LONGEST_STEP: Duration = Duration::from_millis(20);
 /// The glass has settled when it is this near to its rest, counts,
@@ -80,6 +83,8 @@ pub struct Optotune {
     set_point: i16,
     /// The set-point before.
     before: i16,
+    /// When it was read back last.
+    checked: HostMicros,
     sweep: Option<Sweep>,
     response: Response,
 }
@@ -93,8 +98,10 @@ impl Optotune {
     pub fn open(port: Port, config: OptotuneConfig, clock: Arc<dyn Clock>) -> Result<Self, DeviceError> {
         let mut line = Line::new("Optotune Lens Driver", port, clock);
         let Greeting { serial, range, set_point } = greet(&mut line, config.quantity)?;
-        let response = Response::new(config.response, line.now(), f64::from(set_point));
-        Ok(Self { line, config, serial, range, set_point, before: set_point, sweep: None, response })
+        let checked = line.now();
+        let response = Response::new(config.response, checked, f64::from(set_point));
+        let (before, sweep) = (set_point, None);
+        Ok(Self { line, config, serial, range, set_point, before, checked, sweep, response })
     }
 
     fn ready(&mut self) -> Result<(), DeviceError> {
@@ -144,6 +151,7 @@ impl Optotune {
             heard = read_back(&mut self.line, self.config.quantity)?;
         }
         if heard == self.set_point {
+            self.checked = self.line.now();
             return Ok(());
         }
         self.line.close();
@@ -166,10 +174,7 @@ struct Greeting {
 fn greet(line: &mut Line, quantity: Quantity) -> Result<Greeting, DeviceError> {
     line.open()?;
     let greeting = introduce(line, quantity);
-    if greeting.is_err() {
-        line.close();
-    }
-    greeting
+    line.greeted(greeting)
 }
 
 fn introduce(line: &mut Line, quantity: Quantity) -> Result<Greeting, DeviceError> {
@@ -222,6 +227,10 @@ impl Lens for Optotune {
         }
     }
 
+    fn listen(&mut self, bell: &Bell) {
+        self.line.listen(bell);
+    }
+
     fn home(&mut self) -> Result<(), DeviceError> {
         Ok(())
     }
@@ -243,7 +252,9 @@ impl Lens for Optotune {
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
         self.ready()?;
         self.step()?;
-        self.check()?;
+        if self.sweep.is_none() || self.line.now().since(self.checked) >= READ_BACK {
+            self.check()?;
+        }
         let now = self.line.now();
         let (position, velocity) = self.response.at(now);
         let is_settled =

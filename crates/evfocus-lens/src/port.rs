@@ -3,11 +3,12 @@
 mod list;
 pub(crate) mod serial;
 mod tcp;
+mod watch;
 
 use std::fmt;
 use std::sync::Arc;
 
-use evfocus_hal::{Clock, Connect};
+use evfocus_hal::{Clock, Connect, Transport};
 
 pub use list::{UsbPort, usb_ports};
 
@@ -27,6 +28,15 @@ impl Port {
     /// A port of any kind; errors call it `place`.
     pub fn new(place: impl Into<String>, connect: Connect) -> Self {
         Self { place: place.into(), connect }
+    }
+
+    /// The same, with each connection wrapped by `wrap`, which may watch or spoil what goes over it.
+    #[must_use]
+    pub fn through(
+        mut self,
+        wrap: impl Fn(Box<dyn Transport>) -> Box<dyn Transport> + Send + 'static,
+    ) -> Self {
+        Self { place: self.place, connect: Box::new(move || (self.connect)().map(&wrap)) }
     }
 
     /// A serial port, 8 data bits, no parity, one stop bit, no flow control. `path` may be a link, as those in

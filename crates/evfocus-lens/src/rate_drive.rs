@@ -41,8 +41,10 @@ impl RateDrive {
         Ok(true)
     }
 
-    /// The first reading tells where the lens is.
-    pub(crate) fn begin_at(&mut self, sample: &LensSample) {
+    /// The first reading tells where the lens is; readings have `steps` steps from zero to the full one.
+    pub(crate) fn begin_at(&mut self, sample: &LensSample, steps: f64) {
+        let DriveConfig { at_zero, at_full, .. } = *self.drive.config();
+        self.drive.set_resolution((at_full - at_zero) / steps);
         self.drive.follow(sample.replied, sample.position).unwrap_or_default();
     }
 

@@ -1,5 +1,6 @@
-//! How long a command takes from the decision until it leaves for the lens: through the daemon's lens thread and each driver, to the
-//! model of its device on a pseudo-terminal or a socket, in real time. A report; nothing is asserted.
+//! How long a command takes from the decision until its first bytes are written: through the daemon's lens thread and each driver, to the
+//! model of its device on a pseudo-terminal or a socket, in real time. A motion of a lens that the driver steers has left when the loop has
+//! it. A report; nothing is asserted.
 #![expect(clippy::print_stdout, reason = "the report is what this program is for")]
 
 use std::path::Path;
@@ -10,7 +11,7 @@ use anyhow::Result;
 use evfocus_hal::{Clock, Lens, SystemClock};
 use evfocus_lens::{Port, firmata, grbl, moonlite, optotune};
 use evfocusd::config::LensBackend;
-use evfocusd::{Config, command_latency, devices};
+use evfocusd::{Config, Departures, command_latency, devices};
 use hil_sim::Rig;
 use hil_sim::wire::{Protocol, Server, WirePort};
 
@@ -34,11 +35,12 @@ const LENSES: [(&str, u32); 7] = [
 ];
 
 fn main() -> Result<()> {
-    println!("Milliseconds from the decision until the driver has the command, {ORDERS} commands each.\n");
+    println!("Milliseconds from the decision until the command has left, {ORDERS} commands each.\n");
     println!("| driver | median | 99 % | most |\n| --- | ---: | ---: | ---: |");
     for (section, baud) in LENSES {
         let config = Config::parse(&format!("[lens]\n{section}"), Path::new("(in the benchmark)"))?;
         let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
+        let departures = Departures::new(Arc::clone(&clock));
         let (lens, _server): (Box<dyn Lens>, Option<Server>) = match &config.lens {
             LensBackend::Simulated => {
                 (Box::new(Rig::new(config.rig.clone(), Arc::clone(&clock))?.devices().1), None)
@@ -54,10 +56,10 @@ fn main() -> Result<()> {
                     let port = Port::serial(server.address(), baud, Arc::clone(&clock));
                     (server, port)
                 };
-                (devices::open_driver(driver, port, Arc::clone(&clock))?, Some(server))
+                (devices::open_driver(driver, departures.tap(port), Arc::clone(&clock))?, Some(server))
             }
         };
-        let mut latencies = command_latency(lens, config.lens_poll, ORDERS);
+        let mut latencies = command_latency(lens, config.lens_poll, ORDERS, &departures);
         latencies.sort_unstable();
         let millis = |share: f64| {
             let index = ((latencies.len() as f64 * share) as usize).min(latencies.len().saturating_sub(1));

@@ -32,5 +32,5 @@ pub mod windows;
 mod wire;
 
 pub use config::{Config, ConfigError};
-pub use threads::latency::command_latency;
+pub use threads::latency::{Departures, command_latency};
 pub use virtual_rig::{VirtualRig, VirtualRigError};

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use evfocus_core::HostMicros;
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Transport};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Transport};
 
 use super::line::Line;
 use super::{Motor, Protocol, WireFault};
@@ -44,7 +44,7 @@ impl WirePort {
     /// [`DeviceErrorKind::Disconnected`] while the cable is out.
     pub fn open(&self) -> Result<Box<dyn Transport>, DeviceError> {
         let plug = self.line().plug(self.clock.now()).ok_or_else(|| self.unplugged())?;
-        Ok(Box::new(Connection { port: self.clone(), plug }))
+        Ok(Box::new(Connection { port: self.clone(), plug, bell: Bell::default() }))
     }
 
     /// Lets `fault` strike now; it takes the place of one that lasts.
@@ -75,6 +75,7 @@ impl WirePort {
 struct Connection {
     port: WirePort,
     plug: u32,
+    bell: Bell,
 }
 
 impl Connection {
@@ -99,13 +100,17 @@ impl Transport for Connection {
             let now = self.port.now();
             let mut line = self.line()?;
             let length = line.take(buffer, now);
-            if length > 0 || now >= deadline {
+            if length > 0 || now >= deadline || self.bell.rings() {
                 return Ok(length);
             }
             let wake = line.next().map_or(deadline, |next| next.min(deadline));
             drop(line);
             self.port.clock.sleep_until(wake);
         }
+    }
+
+    fn listen(&mut self, bell: &Bell) {
+        self.bell = bell.clone();
     }
 
     fn drain(&mut self) -> Result<(), DeviceError> {

@@ -68,10 +68,7 @@ impl Session {
         self.device.clone_from(&config.device);
         self.properties.clear();
         let begun = self.introduce(config);
-        if begun.is_err() {
-            self.line.close();
-        }
-        begun
+        self.line.greeted(begun)
     }
 
     fn introduce(&mut self, config: &IndiConfig) -> Result<LensRange, DeviceError> {
@@ -226,7 +223,15 @@ impl Session {
     /// What people are told about a failure, which comes after it.
     pub(super) fn wait_for_words(&mut self) -> Result<String, DeviceError> {
         let deadline = self.line.now() + EXPLANATION;
-        while self.words.is_empty() && self.line.now() < deadline && self.next(deadline)?.is_some() {}
+        while self.words.is_empty() && self.line.now() < deadline {
+            match self.next(deadline) {
+                Ok(Some(_)) => {}
+                Ok(None) => break,
+                // The failure matters more than its reason.
+                Err(error) if error.is_interruption() => break,
+                Err(error) => return Err(error),
+            }
+        }
         let words = std::mem::take(&mut self.words);
         Ok(if words.is_empty() { "the server does not say why".to_owned() } else { words })
     }

@@ -1,19 +1,23 @@
 //! A serial port of the operating system.
 
 use std::io::{ErrorKind, Read, Write};
+use std::os::fd::AsRawFd;
 use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::HostMicros;
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Transport};
-use serialport::{ClearBuffer, SerialPort};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Transport};
+use serialport::{ClearBuffer, SerialPort, TTYPort};
+
+use super::watch::Watch;
 
 /// How long the line may refuse to take bytes.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(500);
 
 struct Serial {
     path: String,
-    port: Box<dyn SerialPort>,
+    port: TTYPort,
+    watch: Watch,
     clock: Arc<dyn Clock>,
 }
 
@@ -22,9 +26,12 @@ pub(crate) fn open(path: &str, baud: u32, clock: Arc<dyn Clock>) -> Result<Box<d
     // DTR is left alone: pseudo-terminals have none, and Arduinos reset when it changes.
     let port = serialport::new(path, baud)
         .timeout(WRITE_TIMEOUT)
-        .open()
+        .open_native()
         .map_err(|error| explain_open(path, &error))?;
-    Ok(Box::new(Serial { path: path.to_owned(), port, clock }))
+    let watch = Watch::new(port.as_raw_fd()).map_err(|error| {
+        DeviceError::new(DeviceErrorKind::Fault, path, format!("cannot be waited for: {error}"))
+    })?;
+    Ok(Box::new(Serial { path: path.to_owned(), port, watch, clock }))
 }
 
 fn explain_open(path: &str, error: &serialport::Error) -> DeviceError {
@@ -59,6 +66,17 @@ impl Serial {
         let what = format!("cannot {doing}: {error}; is the cable plugged in?");
         DeviceError::new(DeviceErrorKind::Disconnected, &self.path, what)
     }
+
+    /// What is there.
+    fn take(&mut self, buffer: &mut [u8]) -> Result<usize, DeviceError> {
+        self.port.set_timeout(Duration::ZERO).map_err(|error| self.lost("read", &error))?;
+        match self.port.read(buffer) {
+            Ok(0) if !buffer.is_empty() => Err(self.lost("read", &"the port is at its end")),
+            Ok(length) => Ok(length),
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
+            Err(error) => Err(self.lost("read", &error)),
+        }
+    }
 }
 
 impl Transport for Serial {
@@ -75,13 +93,18 @@ impl Transport for Serial {
     }
 
     fn read(&mut self, buffer: &mut [u8], deadline: HostMicros) -> Result<usize, DeviceError> {
-        let wait = deadline.since(self.clock.now());
-        self.port.set_timeout(wait).map_err(|error| self.lost("read", &error))?;
-        match self.port.read(buffer) {
-            Ok(0) if !buffer.is_empty() => Err(self.lost("read", &"the port is at its end")),
-            Ok(length) => Ok(length),
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
-            Err(error) => Err(self.lost("read", &error)),
+        loop {
+            let length = self.take(buffer)?;
+            let left = deadline.since(self.clock.now());
+            if length > 0 || !self.watch.wait(left).map_err(|error| self.lost("read", &error))? {
+                return Ok(length);
+            }
+        }
+    }
+
+    fn listen(&mut self, bell: &Bell) {
+        if let Err(error) = self.watch.listen(bell) {
+            tracing::error!(port = self.path, %error, "orders will wait for the answers to questions");
         }
     }
 

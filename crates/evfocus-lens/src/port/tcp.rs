@@ -2,11 +2,14 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
+use std::os::fd::AsRawFd;
 use std::sync::Arc;
 use std::time::Duration;
 
 use evfocus_core::HostMicros;
-use evfocus_hal::{Clock, DeviceError, DeviceErrorKind, Transport};
+use evfocus_hal::{Bell, Clock, DeviceError, DeviceErrorKind, Transport};
+
+use super::watch::Watch;
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 const WRITE_TIMEOUT: Duration = Duration::from_millis(500);
@@ -16,6 +19,7 @@ const MOST_DRAINED: usize = 1 << 20;
 struct Tcp {
     address: String,
     stream: TcpStream,
+    watch: Watch,
     clock: Arc<dyn Clock>,
 }
 
@@ -31,8 +35,10 @@ pub(super) fn open(address: &str, clock: Arc<dyn Clock>) -> Result<Box<dyn Trans
             Ok(stream) => {
                 let ready =
                     stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(WRITE_TIMEOUT)));
-                ready.map_err(|error| unreachable(error.to_string()))?;
-                return Ok(Box::new(Tcp { address: address.to_owned(), stream, clock }));
+                let watch = ready
+                    .and_then(|()| Watch::new(stream.as_raw_fd()))
+                    .map_err(|error| unreachable(error.to_string()))?;
+                return Ok(Box::new(Tcp { address: address.to_owned(), stream, watch, clock }));
             }
             Err(error) => failure = error.to_string(),
         }
@@ -46,28 +52,17 @@ impl Tcp {
         DeviceError::new(DeviceErrorKind::Disconnected, &self.address, what)
     }
 
-    /// What is there, after at most `wait`. The operating system has no timeout of zero, and rounds short ones up to its
-    /// scheduler's tick, several milliseconds; hence the other mode for no wait.
-    fn read_for(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, DeviceError> {
-        let read = if wait.is_zero() {
-            self.stream.set_nonblocking(true).and_then(|()| {
-                let read = self.stream.read(buffer);
-                self.stream.set_nonblocking(false).and(read)
-            })
-        } else {
-            self.stream.set_read_timeout(Some(wait)).and_then(|()| self.stream.read(buffer))
-        };
+    /// What is there.
+    fn take(&mut self, buffer: &mut [u8]) -> Result<usize, DeviceError> {
+        // The operating system has no timeout of zero; hence the other mode.
+        let read = self.stream.set_nonblocking(true).and_then(|()| {
+            let read = self.stream.read(buffer);
+            self.stream.set_nonblocking(false).and(read)
+        });
         match read {
             Ok(0) if !buffer.is_empty() => Err(self.lost("read", &"the peer closed the connection")),
             Ok(length) => Ok(length),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
-                ) =>
-            {
-                Ok(0)
-            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
             Err(error) => Err(self.lost("read", &error)),
         }
     }
@@ -86,14 +81,25 @@ impl Transport for Tcp {
     }
 
     fn read(&mut self, buffer: &mut [u8], deadline: HostMicros) -> Result<usize, DeviceError> {
-        let wait = deadline.since(self.clock.now());
-        self.read_for(buffer, wait)
+        loop {
+            let length = self.take(buffer)?;
+            let left = deadline.since(self.clock.now());
+            if length > 0 || !self.watch.wait(left).map_err(|error| self.lost("read", &error))? {
+                return Ok(length);
+            }
+        }
+    }
+
+    fn listen(&mut self, bell: &Bell) {
+        if let Err(error) = self.watch.listen(bell) {
+            tracing::error!(address = self.address, %error, "orders will wait for the answers to questions");
+        }
     }
 
     fn drain(&mut self) -> Result<(), DeviceError> {
         let (mut scrap, mut drained) = ([0; 4096], 0);
         while drained < MOST_DRAINED {
-            match self.read_for(&mut scrap, Duration::ZERO)? {
+            match self.take(&mut scrap)? {
                 0 => break,
                 length => drained += length,
             }

@@ -22,6 +22,11 @@ impl Bench {
         Self::on(Arc::new(VirtualClock::new()), protocol, RigConfig { lens, ..RigConfig::default() })
     }
 
+    /// In virtual time, with other noise.
+    pub(crate) fn seeded(protocol: Protocol, lens: LensConfig, seed: u64) -> Self {
+        Self::on(Arc::new(VirtualClock::new()), protocol, RigConfig { lens, seed, ..RigConfig::default() })
+    }
+
     /// The same in another rig, in which things go wrong.
     pub(crate) fn with_faults(&self, protocol: Protocol, faults: Vec<Fault>) -> Self {
         let config = RigConfig { faults, ..self.rig.config().clone() };

@@ -13,7 +13,7 @@ use hil_sim::wire::{Protocol, Server, WireFault};
 
 use crate::bench::{Bench, says, stands};
 
-fn motor(needs_homing: bool) -> LensConfig {
+pub(crate) fn motor(needs_homing: bool) -> LensConfig {
     LensConfig {
         max_speed: LensSpeed::new(1000.0).unwrap(),
         needs_homing,
@@ -22,7 +22,7 @@ fn motor(needs_homing: bool) -> LensConfig {
     }
 }
 
-fn config(needs_homing: bool) -> GrblConfig {
+pub(crate) fn config(needs_homing: bool) -> GrblConfig {
     let range = LensRange::new(LensPosition(220.0), LensPosition(3750.0)).unwrap();
     GrblConfig { axis: Axis::X, range, needs_homing }
 }

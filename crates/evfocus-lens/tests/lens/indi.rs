@@ -12,7 +12,7 @@ use hil_sim::wire::{Protocol, Server, WireFault};
 
 use crate::bench::{Bench, says, stands};
 
-fn motor() -> LensConfig {
+pub(crate) fn motor() -> LensConfig {
     LensConfig {
         max_speed: LensSpeed::new(1000.0).unwrap(),
         start: LensPosition(1000.0),
@@ -20,7 +20,7 @@ fn motor() -> LensConfig {
     }
 }
 
-fn config() -> IndiConfig {
+pub(crate) fn config() -> IndiConfig {
     IndiConfig {
         device: "Focuser".to_owned(),
         settings: vec![Setting {

@@ -9,4 +9,5 @@ mod indi;
 mod labjack;
 mod moonlite;
 mod optotune;
+mod orders;
 mod probe;

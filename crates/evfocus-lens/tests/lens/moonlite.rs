@@ -15,11 +15,11 @@ use crate::bench::{Bench, says, stands};
 const SPEED: f64 = 1000.0;
 
 /// A stepper: fast for its kind, so that tests are short.
-fn motor() -> LensConfig {
+pub(crate) fn motor() -> LensConfig {
     LensConfig { max_speed: LensSpeed::new(SPEED).unwrap(), ..LensConfig::default() }
 }
 
-fn config() -> MoonLiteConfig {
+pub(crate) fn config() -> MoonLiteConfig {
     MoonLiteConfig {
         range: LensRange::new(LensPosition(220.0), LensPosition(3750.0)).unwrap(),
         max_speed: LensSpeed::new(SPEED).unwrap(),

@@ -12,7 +12,7 @@ use hil_sim::wire::{Protocol, Server, WireFault};
 
 use crate::bench::{Bench, says, stands};
 
-fn config(quantity: Quantity) -> OptotuneConfig {
+pub(crate) fn config(quantity: Quantity) -> OptotuneConfig {
     OptotuneConfig {
         quantity,
         max_speed: LensSpeed::new(1765.0).unwrap(),
@@ -51,6 +51,7 @@ fn the_response_model_says_where_the_glass_is() {
         let sample = lens.sample().unwrap();
         worst = worst.max(sample.position.distance(bench.rig.glass(sample.time())));
         samples += 2;
+        bench.wait(Duration::from_millis(1));
     }
     let rate = f64::from(samples) / bench.now().since(began).as_secs_f64();
     println!("within {worst:.2} counts at {rate:.0} samples/s");

@@ -33,6 +33,7 @@ impl Transport for Deaf {
         self.0.sleep_until(deadline);
         Ok(0)
     }
+    fn listen(&mut self, _: &evfocus_hal::Bell) {}
     fn drain(&mut self) -> Result<(), DeviceError> {
         Ok(())
     }

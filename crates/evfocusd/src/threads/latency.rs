@@ -1,12 +1,13 @@
-//! How long an order takes from the control thread's decision until the driver of the lens has it.
+//! How long an order takes from the control thread's decision until it has left for the lens.
 
-use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use evfocus_core::controller::Action;
 use evfocus_core::{HostMicros, LensPosition, LensSample, LensSpeed};
-use evfocus_hal::{Clock, DeviceError, Lens, LensInfo, SystemClock};
+use evfocus_hal::{Bell, Clock, DeviceError, Lens, LensInfo, Transport};
+use evfocus_lens::Port;
 use rtrb::RingBuffer;
 
 use super::NOTICES;
@@ -17,17 +18,102 @@ use crate::vitals::Vitals;
 /// An answer that takes longer than this will not come.
 const LOST: Duration = Duration::from_secs(5);
 
-/// Notes when an order arrives, and passes it on.
+/// What has become of the order that the lens has.
+#[derive(Debug, Clone, Copy)]
+enum Order {
+    None,
+    /// The driver has it.
+    Given,
+    /// Its first bytes were written.
+    Left(HostMicros),
+}
+
+/// Notes when orders leave for a lens: give its port to [`tap`](Self::tap).
+#[derive(Clone)]
+pub struct Departures {
+    clock: Arc<dyn Clock>,
+    order: Arc<Mutex<Order>>,
+}
+
+impl std::fmt::Debug for Departures {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Departures").field("order", &self.order).finish_non_exhaustive()
+    }
+}
+
+impl Departures {
+    /// None yet; times are those of `clock`.
+    pub fn new(clock: Arc<dyn Clock>) -> Self {
+        Self { clock, order: Arc::new(Mutex::new(Order::None)) }
+    }
+
+    /// The same port, watched.
+    #[must_use]
+    pub fn tap(&self, port: Port) -> Port {
+        let departures = self.clone();
+        port.through(move |line| Box::new(Tap { line, departures: departures.clone() }))
+    }
+
+    fn order(&self) -> MutexGuard<'_, Order> {
+        self.order.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn note(&self) {
+        let mut order = self.order();
+        if let Order::Given = *order {
+            *order = Order::Left(self.clock.now());
+        }
+    }
+}
+
+/// A line that notes when the first bytes of an order have been written.
+struct Tap {
+    line: Box<dyn Transport>,
+    departures: Departures,
+}
+
+impl Transport for Tap {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), DeviceError> {
+        self.line.write(bytes)?;
+        self.departures.note();
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], deadline: HostMicros) -> Result<usize, DeviceError> {
+        self.line.read(buffer, deadline)
+    }
+
+    fn listen(&mut self, bell: &Bell) {
+        self.line.listen(bell);
+    }
+
+    fn drain(&mut self) -> Result<(), DeviceError> {
+        self.line.drain()
+    }
+}
+
+/// Notes when an order has left, and passes it on.
 struct Watched {
     lens: Box<dyn Lens>,
-    clock: Arc<dyn Clock>,
-    arrivals: Sender<HostMicros>,
+    departures: Departures,
+    left: Sender<HostMicros>,
 }
 
 impl Watched {
-    fn note(&self) {
+    /// An order for which nothing is written is with the loop that steers the lens when the call returns.
+    fn obey(
+        &mut self,
+        order: impl FnOnce(&mut dyn Lens) -> Result<(), DeviceError>,
+    ) -> Result<(), DeviceError> {
+        *self.departures.order() = Order::Given;
+        let outcome = order(self.lens.as_mut());
+        let left = match std::mem::replace(&mut *self.departures.order(), Order::None) {
+            Order::Left(time) => time,
+            Order::None | Order::Given => self.departures.clock.now(),
+        };
         // Whoever counts may have gone.
-        self.arrivals.send(self.clock.now()).unwrap_or_default();
+        self.left.send(left).unwrap_or_default();
+        outcome
     }
 }
 
@@ -36,18 +122,20 @@ impl Lens for Watched {
         self.lens.info()
     }
 
+    fn listen(&mut self, bell: &Bell) {
+        self.lens.listen(bell);
+    }
+
     fn home(&mut self) -> Result<(), DeviceError> {
         self.lens.home()
     }
 
     fn move_to(&mut self, target: LensPosition, speed: LensSpeed) -> Result<(), DeviceError> {
-        self.note();
-        self.lens.move_to(target, speed)
+        self.obey(|lens| lens.move_to(target, speed))
     }
 
     fn stop(&mut self) -> Result<(), DeviceError> {
-        self.note();
-        self.lens.stop()
+        self.obey(|lens| lens.stop())
     }
 
     fn sample(&mut self) -> Result<LensSample, DeviceError> {
@@ -56,12 +144,18 @@ impl Lens for Watched {
 }
 
 /// Orders the lens about `count` times, there and back and stopped in turn, through the thread that the daemon runs it on, while that
-/// asks every `poll` for its position; how long each order took to the driver, in real time.
-pub fn command_latency(lens: Box<dyn Lens>, poll: Duration, count: usize) -> Vec<Duration> {
-    let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
-    let (arrivals, arrived) = channel();
+/// asks every `poll` for its position. How long each order took, in real time: until its first bytes were written, or, where the order is
+/// one for a loop in the driver, until that had it.
+pub fn command_latency(
+    lens: Box<dyn Lens>,
+    poll: Duration,
+    count: usize,
+    departures: &Departures,
+) -> Vec<Duration> {
+    let clock = Arc::clone(&departures.clock);
+    let (left, has_left) = channel();
     let info = lens.info();
-    let watched = Watched { lens, clock: Arc::clone(&clock), arrivals };
+    let watched = Watched { lens, departures: departures.clone(), left };
     let (orders_in, orders_out) = orders();
     let (samples, mut taken) = RingBuffer::new(SAMPLES);
     let (notices, _kept) = RingBuffer::new(NOTICES);
@@ -83,7 +177,7 @@ pub fn command_latency(lens: Box<dyn Lens>, poll: Duration, count: usize) -> Vec
         clock.sleep_until(clock.now() + Duration::from_micros(pause));
         while taken.pop().is_ok() {}
         // The thread itself stops the lens when it begins.
-        while arrived.try_recv().is_ok() {}
+        while has_left.try_recv().is_ok() {}
         let share = if index % 4 < 2 { 0.6 } else { 0.4 };
         let target = LensPosition(info.range.min().0 + share * info.range.length());
         let order = if index % 2 == 0 {
@@ -93,7 +187,7 @@ pub fn command_latency(lens: Box<dyn Lens>, poll: Duration, count: usize) -> Vec
         };
         let decided = clock.now();
         orders_in.send(order);
-        match arrived.recv_timeout(LOST) {
+        match has_left.recv_timeout(LOST) {
             Ok(at) => latencies.push(at.since(decided)),
             Err(_) => break,
         }

@@ -72,10 +72,9 @@ impl LensThread {
     /// Runs until there can be no more orders, then stops the lens.
     pub(crate) fn run(mut self) {
         let mut state = Health::Sound;
+        self.lens.listen(self.orders.bell());
         // A daemon that was killed may have left it moving.
-        if let Err(error) = self.lens.stop() {
-            self.fail(&error, &mut state);
-        }
+        self.obey(Action::StopLens, &mut state);
         let mut next_poll = self.clock.now();
         let mut progress = Progress { beats: 0, since: next_poll, stopped: false };
         let mut attentive_until = next_poll;
@@ -111,12 +110,15 @@ impl LensThread {
         }
     }
 
-    /// A failed lens is still told to stop; motions were ordered by somebody who did not know yet.
+    /// A failed lens is still told to stop; motions were ordered by somebody who did not know yet. A motion that a stop cuts short is not
+    /// missed.
     fn obey(&mut self, order: Action, state: &mut Health) {
         if *state == Health::Failed && order != Action::StopLens {
             return;
         }
-        if let Err(error) = devices::perform(order, self.lens.as_mut()) {
+        if let Err(error) = devices::perform(order, self.lens.as_mut())
+            && !error.is_interruption()
+        {
             self.fail(&error, state);
         }
     }
@@ -132,6 +134,8 @@ impl LensThread {
         }
         let sample = match answer {
             Ok(sample) => sample,
+            // The order first, then again.
+            Err(error) if error.is_interruption() => return Duration::ZERO,
             Err(error) => {
                 self.fail(&error, state);
                 return RETRY;

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use evfocus_core::HostMicros;
 use evfocus_core::controller::Action;
+use evfocus_hal::Bell;
 
 /// What the lens is to do next. A slot rather than a queue: a motion that has been replaced need not be begun, so there is
 /// always room, however many callers move the lens at once.
@@ -13,12 +14,14 @@ struct Slot {
     stop: bool,
     motion: Option<Action>,
     closed: bool,
+    /// What is being done.
+    at_work: Option<Action>,
     obeyed: HostMicros,
 }
 
 impl Default for Slot {
     fn default() -> Self {
-        Self { stop: false, motion: None, closed: false, obeyed: HostMicros(i64::MIN) }
+        Self { stop: false, motion: None, closed: false, at_work: None, obeyed: HostMicros(i64::MIN) }
     }
 }
 
@@ -26,6 +29,8 @@ impl Default for Slot {
 struct Shared {
     slot: Mutex<Slot>,
     filled: Condvar,
+    /// Rings for an order that need not wait for what the lens thread does.
+    bell: Bell,
 }
 
 impl Shared {
@@ -71,6 +76,15 @@ impl OrderSender {
             }
             Action::RunEnded => return,
         }
+        // A motion cut short by each one that follows would never be done, and nothing is more urgent than a stop.
+        let may_interrupt = match slot.at_work {
+            None => true,
+            Some(Action::StopLens) => false,
+            Some(_) => slot.stop,
+        };
+        if may_interrupt {
+            self.0.bell.ring();
+        }
         self.0.filled.notify_one();
     }
 
@@ -84,20 +98,27 @@ impl OrderSender {
 impl Drop for OrderSender {
     fn drop(&mut self) {
         self.0.slot().closed = true;
+        self.0.bell.ring();
         self.0.filled.notify_one();
     }
 }
 
 impl OrderReceiver {
+    /// Rings while an order has come that should not wait.
+    pub(crate) fn bell(&self) -> &Bell {
+        &self.0.bell
+    }
+
     /// Waits for an order for at most `timeout`; a stop comes before the motion that was ordered after it.
     pub(crate) fn receive(&self, timeout: Duration) -> Received {
         let is_empty = |slot: &mut Slot| !slot.stop && slot.motion.is_none() && !slot.closed;
         let slot = self.0.filled.wait_timeout_while(self.0.slot(), timeout, is_empty);
         let mut slot = slot.unwrap_or_else(PoisonError::into_inner).0;
-        if std::mem::take(&mut slot.stop) {
-            Received::Order(Action::StopLens)
-        } else if let Some(motion) = slot.motion.take() {
-            Received::Order(motion)
+        self.0.bell.hush();
+        slot.at_work =
+            if std::mem::take(&mut slot.stop) { Some(Action::StopLens) } else { slot.motion.take() };
+        if let Some(order) = slot.at_work {
+            Received::Order(order)
         } else if slot.closed {
             Received::End
         } else {
@@ -108,6 +129,7 @@ impl OrderReceiver {
     /// Everything received was done, or failed, by `now`.
     pub(crate) fn done(&self, now: HostMicros) {
         let mut slot = self.0.slot();
+        slot.at_work = None;
         if slot.motion.is_none() {
             slot.obeyed = now;
         }
@@ -168,6 +190,28 @@ mod tests {
         assert_eq!(all(&receiver), [Received::Order(Action::StopLens)]);
         receiver.done(HostMicros(30));
         assert_eq!(sender.obeyed(), HostMicros(30), "the stop took the third back");
+    }
+
+    #[test]
+    fn an_order_rings_unless_it_must_wait_for_the_one_before() {
+        let (sender, receiver) = orders();
+        let rings = |order| {
+            sender.send(order);
+            receiver.bell().rings()
+        };
+        assert!(rings(to(1.0)), "whatever was asked of the lens, it waits");
+        assert_eq!(receiver.receive(Duration::ZERO), Received::Order(to(1.0)));
+        assert!(!receiver.bell().rings(), "the call was heard");
+        assert!(!rings(to(2.0)), "or no motion would ever be done");
+        assert!(rings(Action::StopLens), "nothing is more urgent");
+        assert_eq!(receiver.receive(Duration::ZERO), Received::Order(Action::StopLens));
+        assert!(!rings(to(3.0)) && !rings(Action::StopLens), "nothing cuts a stop short");
+        receiver.done(HostMicros(10));
+        assert_eq!(receiver.receive(Duration::ZERO), Received::Order(Action::StopLens));
+        receiver.done(HostMicros(20));
+        assert!(rings(to(4.0)));
+        drop(sender);
+        assert!(receiver.bell().rings());
     }
 
     #[test]
