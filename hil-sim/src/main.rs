@@ -32,7 +32,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Offer a rig until standard input ends. Orders, one a line: "unplug camera", "plug camera", "unplug lens", "plug lens",
-    /// "state" (where the glass is), "tally N" (sums over the first N events that the camera sent; N is a power of two).
+    /// "state" (where the glass is), "sent" (events that the camera put into its streams), "tally N" (sums over the first N events that the camera sent; N is a power of two).
     Serve(Serve),
 }
 
@@ -71,6 +71,9 @@ struct Serve {
     /// Steady motion of the scene to the right, pixels per second.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     velocity: f64,
+    /// Events a second by chance from the pixels that are not simulated, below those that are.
+    #[arg(long, value_name = "EVENTS", default_value_t = 0)]
+    background: u32,
     /// Every random choice follows from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -121,6 +124,9 @@ impl Serve {
         let rig = Rig::new(self.rig(), Arc::clone(&clock))?;
         let mut out = std::io::stdout();
         let camera = self.camera.map(|model| rig.plug(model));
+        if let (Some(camera), 1..) = (&camera, self.background) {
+            camera.set_background(self.background);
+        }
         let usbip = camera.clone().map(|port| usbip::Server::tcp(port, self.usbip_port)).transpose()?;
         if let Some(usbip) = &usbip {
             let address = usbip.address();
@@ -175,6 +181,10 @@ impl Bench {
                 let after = self.rig.glass(self.clock.now()).0;
                 let speed = (after - before) / LOOK.as_secs_f64();
                 return writeln!(out, "state: glass at {after:.1} counts, {speed:.0} counts/s");
+            }
+            ("sent", Some(camera), _) => {
+                let (events, bytes) = camera.sent();
+                return writeln!(out, "sent: {events} events, {bytes} bytes");
             }
             (_, Some(camera), _) if order.starts_with("tally ") => {
                 let wanted = order.strip_prefix("tally ").and_then(|events| events.parse().ok());

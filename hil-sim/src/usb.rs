@@ -7,6 +7,7 @@
 //! The picture of the rig's sensor is the upper left part of the device's, so that a small simulated sensor can stand for a
 //! large one.
 
+mod background;
 mod davis346;
 mod descriptors;
 mod device;
@@ -23,6 +24,7 @@ use evfocus_hal::usb::{UsbError, UsbIdentity};
 
 use crate::camera::SimCamera;
 use crate::rig::Rig;
+use background::Background;
 use device::Device;
 use link::Link;
 
@@ -53,6 +55,10 @@ struct Shared {
     device: Box<dyn Device>,
     /// The pixels.
     camera: SimCamera,
+    /// Those that are not simulated.
+    background: Option<Background>,
+    /// Events and bytes that were put into the stream, whatever became of it.
+    sent: (u64, u64),
     faults: UsbFaults,
     /// The data endpoint refuses until its halt is cleared.
     halted: bool,
@@ -72,6 +78,8 @@ impl Rig {
         let shared = Shared {
             device: device::power_up(model, self.config().seed),
             camera: self.devices().0,
+            background: None,
+            sent: (0, 0),
             faults: UsbFaults::default(),
             halted: false,
             is_plugged: true,
@@ -131,6 +139,21 @@ impl UsbPort {
     /// From now on, what goes wrong.
     pub fn set_faults(&self, faults: UsbFaults) {
         lock(&self.shared).faults = faults;
+    }
+
+    /// Lets the pixels below the simulated ones send events by chance, so many a second.
+    pub fn set_background(&self, events_per_s: u32) {
+        let size = match self.model {
+            UsbModel::Davis346 => (346, 260),
+            UsbModel::Evk4 => (1280, 720),
+        };
+        let simulated = self.rig.config().sensor.geometry.height;
+        lock(&self.shared).background = Some(Background::new(events_per_s, size, simulated));
+    }
+
+    /// Events and bytes that the camera has put into its streams so far, over all connections; those that nobody read are among them.
+    pub fn sent(&self) -> (u64, u64) {
+        lock(&self.shared).sent
     }
 
     /// Sums over the first 2, 4, 8 and so on events that the camera has put into its stream, since the stream began or the host

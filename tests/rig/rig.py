@@ -20,15 +20,13 @@ HERE = pathlib.Path(__file__).resolve().parent
 TARGET = HERE.parent.parent / "target"
 
 
-def qemu(out: pathlib.Path, words: dict[str, object], memory: int, shift: int | None) -> list[str]:
+def qemu(out: pathlib.Path, words: dict[str, object], memory: int, shift: int) -> list[str]:
     append = ["console=ttyS0 quiet panic=-1 mitigations=off noautogroup", *(f"rig.{key}={value}" for key, value in words.items())]
     if "root" in words:
         append += ["systemd.unit=multi-user.target", "systemd.wants=rig.service", "systemd.show_status=0"]
         append += [f"systemd.mask={unit}" for unit in ("serial-getty@ttyS0.service", "getty@tty1.service")]
     share = "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap"
-    command = ["qemu-system-x86_64", "-M", "q35", "-accel", "tcg", "-rtc", "clock=vm"]
-    if shift is not None:
-        command += ["-icount", f"shift={shift},sleep=on"]
+    command = ["qemu-system-x86_64", "-M", "q35", "-accel", "tcg", "-icount", f"shift={shift},sleep=on", "-rtc", "clock=vm"]
     command += ["-cpu", "max", "-m", str(memory), "-nodefaults", "-nographic", "-no-reboot", "-virtfs", share]
     return [*command, "-serial", "stdio", "-kernel", str(out / "vmlinux"), "-initrd", str(out / "initrd"), "-append", " ".join(append)]
 
@@ -43,10 +41,9 @@ def main() -> int:
     parser.add_argument("--packages", type=pathlib.Path, help="where the packages are that are to be installed in it")
     parser.add_argument("--minutes", type=int, default=20, help="of the soak, in the guest's time")
     parser.add_argument("--seed", type=int, default=1, help="of the soak's accidents")
-    parser.add_argument("--background", type=int, default=100_000, help="events a second in the soak besides those of the scene")
+    parser.add_argument("--background", type=int, default=1_000_000, help="events a second in the soak besides those of the scene")
     parser.add_argument("--memory", type=int, default=1024, help="of the guest, MiB")
     parser.add_argument("--shift", type=int, default=0, help="an instruction takes 2 to the power of this, ns")
-    parser.add_argument("--real-time", action="store_true", help="the guest's time goes with this machine's, late or not")
     parser.add_argument("--seconds", type=float, default=600, help="longest time of the guest")
     arguments = parser.parse_args()
 
@@ -65,10 +62,7 @@ def main() -> int:
     began = time.monotonic()
     transcript = []
     log = arguments.out / f"{arguments.scenario}-{arguments.camera}.log"
-    if arguments.real_time:
-        words["real-time"] = 1
-    shift = None if arguments.real_time else arguments.shift
-    command = qemu(arguments.out, words, arguments.memory, shift)
+    command = qemu(arguments.out, words, arguments.memory, arguments.shift)
     guest = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True, errors="replace")
     watchdog = threading.Timer(arguments.seconds, guest.kill)
     watchdog.start()

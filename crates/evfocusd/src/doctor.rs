@@ -51,11 +51,20 @@ impl Finding {
     }
 }
 
-/// Examines the machine for a daemon with `config`.
-pub fn examine(config: &Config) -> Vec<Finding> {
+/// The devices that a running daemon has in use. Whether whoever asks may open them is of no importance then.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct InUse {
+    /// The camera.
+    pub camera: bool,
+    /// The lens.
+    pub lens: bool,
+}
+
+/// Examines the machine for a daemon with `config`, which has `in_use` if it runs.
+pub fn examine(config: &Config, in_use: InUse) -> Vec<Finding> {
     let machine = Machine::new(Path::new("/"));
-    let mut findings = cameras(&config.camera);
-    findings.push(lens(&config.lens));
+    let mut findings = cameras(&config.camera, in_use.camera);
+    findings.push(lens(&config.lens, in_use.lens));
     let needs_usb = config.camera.driver().is_some();
     findings.push(machine.udev_rule(needs_usb));
     findings.push(machine.usb_memory(needs_usb));
@@ -69,7 +78,7 @@ pub fn examine(config: &Config) -> Vec<Finding> {
 }
 
 /// Whether the camera is there, can be opened, and is fast enough.
-fn cameras(wanted: &CameraConfig) -> Vec<Finding> {
+fn cameras(wanted: &CameraConfig, in_use: bool) -> Vec<Finding> {
     const CHECK: &str = "camera";
     let Some(driver) = wanted.driver() else {
         return vec![Finding::good(CHECK, wanted.name())];
@@ -92,7 +101,8 @@ fn cameras(wanted: &CameraConfig) -> Vec<Finding> {
                 "{} {} at {}, firmware {}",
                 camera.device.model, camera.serial, camera.location, camera.version
             );
-            match (camera.access, discovery::advice_on_speed(camera.speed)) {
+            let access = if in_use { Access::Busy } else { camera.access };
+            match (access, discovery::advice_on_speed(camera.speed)) {
                 (Access::Denied(remedy) | Access::Faulty(remedy), _) => {
                     Finding::trouble(CHECK, format!("{name}: cannot be opened"), remedy)
                 }
@@ -105,11 +115,11 @@ fn cameras(wanted: &CameraConfig) -> Vec<Finding> {
 }
 
 /// Whether the lens's port is there and may be used.
-fn lens(backend: &LensBackend) -> Finding {
+fn lens(backend: &LensBackend, in_use: bool) -> Finding {
     const CHECK: &str = "lens";
     let (driver, place) = (backend.name(), backend.location());
     let serial = matches!(backend, LensBackend::Driver { place: LensPlace::Serial { .. }, .. });
-    if !serial {
+    if !serial || in_use {
         return Finding::good(CHECK, format!("{driver} {place}").trim_end());
     }
     match rustix::fs::access(place, Mode::READ_OK | Mode::WRITE_OK) {

@@ -183,12 +183,15 @@ impl Link {
         if !shared.device.is_running() {
             return Ok(Step::Stopped);
         }
-        let Shared { device, camera, faults, .. } = &mut *shared;
+        let Shared { device, camera, background, sent, faults, .. } = &mut *shared;
         camera.read(&mut self.batch, wait).map_err(|error| bus_error(&error))?;
         if self.batch.events.is_empty() && self.batch.reached == self.reached {
             return Ok(Step::Early);
         }
         self.reached = self.batch.reached;
+        if let Some(background) = background {
+            background.add(&mut self.batch);
+        }
         if let (Some(duration), Some(reached)) = (faults.overflow.take(), self.batch.reached) {
             self.overflow_until = Some(reached + duration);
         }
@@ -196,11 +199,13 @@ impl Link {
             Some(until) if self.batch.reached < Some(until) => device.overflow(&self.batch),
             Some(_) | None => {
                 self.overflow_until = None;
+                sent.0 += self.batch.events.len() as u64;
                 device.send(&self.batch);
             }
         }
         while let Some(packet) = device.packet() {
             self.sent += 1;
+            sent.1 += packet.len() as u64;
             if faults.lose_one_of.is_some_and(|of| self.sent.is_multiple_of(of)) {
                 continue;
             }

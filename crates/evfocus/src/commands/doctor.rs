@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 use evfocus_ipc::Status;
 use evfocusd::Config;
-use evfocusd::doctor::{Finding, Severity, examine};
+use evfocusd::config::default_state_dir;
+use evfocusd::doctor::{Finding, InUse, Severity, examine};
 use serde_json::json;
 
 use crate::arguments::SocketArguments;
@@ -33,13 +34,19 @@ pub struct Arguments {
     socket: SocketArguments,
 }
 
-/// Where the package puts the configuration.
-const INSTALLED: &str = "/etc/evfocus/evfocusd.toml";
+/// Where the package puts the configuration, and where its unit lets the daemon keep its state.
+const INSTALLED: [&str; 2] = ["/etc/evfocus/evfocusd.toml", "/var/lib/evfocus"];
 
 /// Examines and prints.
 pub fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
-    let mut findings = machine(arguments);
-    findings.extend(daemon(&arguments.socket));
+    let status: anyhow::Result<Status> =
+        block_on(async { Ok(connect(&arguments.socket).await?.status().await?) });
+    let in_use = status.as_ref().map_or_else(
+        |_| InUse::default(),
+        |status| InUse { camera: status.camera.is_some(), lens: status.lens.is_some() },
+    );
+    let mut findings = machine(arguments, in_use);
+    findings.extend(daemon(status));
     let worst = findings.iter().map(|finding| finding.severity).max().unwrap_or(Severity::Good);
     let mut out = Output::new();
     if arguments.socket.json {
@@ -70,16 +77,20 @@ fn word(severity: Severity) -> &'static str {
     }
 }
 
-fn machine(arguments: &Arguments) -> Vec<Finding> {
+fn machine(arguments: &Arguments, in_use: InUse) -> Vec<Finding> {
     const CHECK: &str = "configuration";
-    let installed = PathBuf::from(INSTALLED);
-    let path = arguments.config.clone().or_else(|| installed.exists().then_some(installed));
+    let [installed, state] = INSTALLED.map(PathBuf::from);
+    let path = arguments.config.clone().or_else(|| installed.exists().then(|| installed.clone()));
     let config = path.as_deref().map_or_else(Config::simulated, Config::read);
     match config {
-        Ok(config) => {
+        Ok(mut config) => {
+            // The default is that of whoever asks; the daemon is told by its unit.
+            if path.as_ref() == Some(&installed) && config.state_dir == default_state_dir() {
+                config.state_dir = state;
+            }
             let name =
                 path.map_or_else(|| "none: the simulated rig".to_owned(), |path| path.display().to_string());
-            [vec![Finding::good(CHECK, name)], examine(&config)].concat()
+            [vec![Finding::good(CHECK, name)], examine(&config, in_use)].concat()
         }
         Err(error) => vec![Finding::trouble(
             CHECK,
@@ -89,9 +100,8 @@ fn machine(arguments: &Arguments) -> Vec<Finding> {
     }
 }
 
-fn daemon(socket: &SocketArguments) -> Vec<Finding> {
+fn daemon(status: anyhow::Result<Status>) -> Vec<Finding> {
     const CHECK: &str = "daemon";
-    let status: Result<Status, _> = block_on(async { Ok(connect(socket).await?.status().await?) });
     let status = match status {
         Ok(status) => status,
         Err(error) => {
