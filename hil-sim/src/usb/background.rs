@@ -13,6 +13,8 @@ pub(super) struct Background {
     /// Events that are due and not yet whole, in millionths.
     due: u64,
     reached: Option<CameraMicros>,
+    /// Those of the batch and ours.
+    merged: Vec<Event>,
 }
 
 impl Background {
@@ -27,6 +29,7 @@ impl Background {
             random: 1,
             due: 0,
             reached: None,
+            merged: Vec::new(),
         }
     }
 
@@ -38,12 +41,14 @@ impl Background {
         self.due += micros.unsigned_abs() * u64::from(self.events_per_s);
         let count = (self.due / 1_000_000) as i64;
         self.due %= 1_000_000;
+        self.merged.clear();
+        self.merged.extend(batch.events.iter());
         for index in 0..count {
             self.random ^= self.random << 13;
             self.random ^= self.random >> 17;
             self.random ^= self.random << 5;
             let random = self.random;
-            batch.events.push(Event {
+            self.merged.push(Event {
                 t: CameraMicros(since.0 + 1 + micros * index / count),
                 x: (((random & 0xFFFF) * self.columns) >> 16) as u16,
                 y: (self.first_row + (((random >> 16) * self.rows) >> 16)) as u16,
@@ -51,7 +56,9 @@ impl Background {
             });
         }
         // Two runs in order: merging them is all that is left to do.
-        batch.events.sort_by_key(|event| event.t);
+        self.merged.sort_by_key(|event| event.t);
+        batch.events.clear();
+        batch.lost += batch.events.append(self.merged.iter().copied());
     }
 }
 
@@ -68,7 +75,7 @@ mod tests {
             batch.clear();
             batch.reached = Some(CameraMicros(millisecond * 1_000));
             background.add(&mut batch);
-            assert!(batch.events.is_sorted_by_key(|event| event.t));
+            assert!(batch.events.iter().is_sorted_by_key(|event| event.t));
             assert!(batch.events.iter().all(|event| event.x < 346 && (72..260).contains(&event.y)));
             assert!(batch.events.iter().all(|event| event.t <= CameraMicros(millisecond * 1_000)));
             count += batch.events.len();
