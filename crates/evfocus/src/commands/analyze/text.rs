@@ -59,7 +59,7 @@ fn print_sweep(sweep: &SweepAnalysis, analysis: &RecordingAnalysis, out: &mut Ou
     if report.quality.has_flicker() && sweep.verdict.is_ok() {
         writeln!(out, "  many events follow the {} Hz of the mains", report.quality.flicker_hz)?;
     }
-    writeln!(out, "  each method on this sweep alone, the delay of the pixels still in it:")?;
+    writeln!(out, "  each method on this sweep alone, as if the pixels answered at once:")?;
     for method in Method::ALL {
         let mark = if method == analysis.method { '*' } else { ' ' };
         match report.estimate(method) {
