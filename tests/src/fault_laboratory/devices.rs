@@ -41,12 +41,12 @@ pub enum CameraFault {
     Lies,
     /// Its clock runs a tenth too fast.
     ClockRuns,
-    /// Its clock is an hour ahead.
+    /// Its clock is a hundred hours ahead.
     ClockLeaps,
 }
 
-/// An hour, microseconds.
-const HOUR_US: i64 = 3_600_000_000;
+/// A hundred hours, microseconds: more than the events of one list may lie apart.
+const LEAP_US: i64 = 360_000_000_000;
 
 fn shift_time(batch: &mut EventBatch, shifted: impl Fn(i64) -> i64) {
     let shift = |event: Event| Event { t: CameraMicros(shifted(event.t.0)), ..event };
@@ -163,7 +163,7 @@ impl FaultyCamera {
                 replace(batch, |events| events.into_iter().enumerate().map(lies).collect());
             }
             CameraFault::ClockRuns => shift_time(batch, |t| t + t / 10),
-            CameraFault::ClockLeaps => shift_time(batch, |t| t + HOUR_US),
+            CameraFault::ClockLeaps => shift_time(batch, |t| t + LEAP_US),
             CameraFault::Flood | CameraFault::Unplugged | CameraFault::Silent | CameraFault::Hiccup => {}
         }
     }

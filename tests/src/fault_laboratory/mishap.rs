@@ -71,7 +71,7 @@ impl fmt::Display for Mishap {
             Self::Camera(CameraFault::Flood) => "camera: 20,000 events at one instant, again and again",
             Self::Camera(CameraFault::Lies) => "camera: events outside of the sensor",
             Self::Camera(CameraFault::ClockRuns) => "camera: clock runs a tenth too fast",
-            Self::Camera(CameraFault::ClockLeaps) => "camera: clock leaps an hour ahead, and back",
+            Self::Camera(CameraFault::ClockLeaps) => "camera: clock leaps 100 hours ahead, and back",
             Self::ClockReset => "camera: clock starts anew",
             Self::EventLoss => "camera: events lost on the way",
             Self::Lens(LensFault::Unplugged) => "lens: unplugged for a while",
