@@ -17,7 +17,7 @@ use evfocus_core::{
 use evfocus_ipc::{CALIBRATION_FORMAT, Calibration, LensRange};
 
 pub(crate) use desk::Desk;
-pub(crate) use file::CalibrationFile;
+pub use file::CalibrationFile;
 use leg::{Leg, Progress};
 use play::{Difference, Play};
 

@@ -29,6 +29,7 @@ use crate::reload::{self, Reloader, Reread};
 use crate::reports::{ReportStore, Reports};
 use crate::rig_delay::RigDelayFile;
 use crate::service;
+use crate::storage::StateDirectory;
 use crate::supervisor::{self, Supervisor};
 use crate::threads::camera::{BATCH_EVENTS, BATCHES, CameraThread};
 use crate::threads::control::{CURVE_POINTS, ControlThread, Publications, REPORTS, Seen};
@@ -333,16 +334,17 @@ impl Prepared {
         clock: &Arc<dyn Clock>,
     ) -> anyhow::Result<Self> {
         let access = watch::Sender::new(Arc::new(Access::of(&config.access)?));
-        let store = Reports::new(ReportStore::open(&config.state_dir, config.kept()));
+        let state = StateDirectory::new(&config.state_dir);
+        let store = Reports::new(ReportStore::open(&state, config.kept()));
         if let Some(fault) = store.fault() {
             tracing::error!(%fault, "reports are kept in memory only");
         }
         let run_devices = run_devices(camera, lens);
         // Where another daemon keeps its reports, it keeps its delay too.
         let rig_delay = (store.fault().is_none())
-            .then(|| RigDelayFile::new(&config.state_dir, &run_devices.camera, &run_devices.lens));
+            .then(|| RigDelayFile::new(&state, &run_devices.camera, &run_devices.lens));
         let calibration_file =
-            (store.fault().is_none()).then(|| CalibrationFile::new(&config.state_dir, &run_devices.lens));
+            (store.fault().is_none()).then(|| CalibrationFile::new(&state, &run_devices.lens));
         let calibration = calibration_file.as_ref().and_then(CalibrationFile::read);
         let desk = Desk::new(config.clone(), lens.clone(), calibration.clone());
         let mut settings = desk

@@ -2,30 +2,31 @@
 
 use std::fs::{self, File};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use evfocus_ipc::{Error, Report};
 use tokio::sync::watch;
 
-use crate::storage::{failed, write_json};
+use crate::storage::{StateDirectory, failed};
 
 const PREFIX: &str = "run-";
 const SUFFIX: &str = ".json";
 
 /// Which reports stay; the newest always does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Kept {
+pub struct Kept {
     /// So many.
-    pub(crate) newest: usize,
+    pub newest: usize,
     /// Those younger than this.
-    pub(crate) age: Option<Duration>,
+    pub age: Option<Duration>,
 }
 
 /// Where reports are kept.
 #[derive(Debug, Clone)]
-pub(crate) struct ReportStore {
+pub struct ReportStore {
+    state: StateDirectory,
     directory: PathBuf,
     kept: Arc<Mutex<Kept>>,
     /// Held while the store lives, so that no other daemon numbers its runs in the same directory.
@@ -33,12 +34,12 @@ pub(crate) struct ReportStore {
 }
 
 impl ReportStore {
-    /// The store in `state_dir`, which is made if it is not there. Of the reports, those stay that `kept` says.
+    /// The store in `state`, which is made if it is not there. Of the reports, those stay that `kept` says.
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the directory and the remedy.
-    pub(crate) fn open(state_dir: &Path, kept: Kept) -> Result<Self, Error> {
-        let directory = state_dir.join("reports");
+    pub fn open(state: &StateDirectory, kept: Kept) -> Result<Self, Error> {
+        let directory = state.path("reports");
         fs::create_dir_all(&directory).map_err(|error| failed(&directory, &error))?;
         let lock = File::open(&directory).map_err(|error| failed(&directory, &error))?;
         rustix::fs::flock(&lock, rustix::fs::FlockOperation::NonBlockingLockExclusive).map_err(|_| {
@@ -48,7 +49,7 @@ impl ReportStore {
                     .to_owned(),
             }
         })?;
-        Ok(Self { directory, kept: Arc::new(Mutex::new(kept)), _lock: Arc::new(lock) })
+        Ok(Self { state: state.clone(), directory, kept: Arc::new(Mutex::new(kept)), _lock: Arc::new(lock) })
     }
 
     fn path(&self, id: u64) -> PathBuf {
@@ -60,9 +61,9 @@ impl ReportStore {
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the file; what was there before stays.
-    pub(crate) fn write(&self, report: &Report) -> Result<PathBuf, Error> {
+    pub fn write(&self, report: &Report) -> Result<PathBuf, Error> {
         let path = self.path(report.run_id);
-        write_json(&path, report)?;
+        self.state.write_json(&path, report)?;
         self.drop_oldest();
         Ok(path)
     }
@@ -88,7 +89,7 @@ impl ReportStore {
     }
 
     /// The number of the newest report.
-    pub(crate) fn newest(&self) -> Option<u64> {
+    pub fn newest(&self) -> Option<u64> {
         self.numbers().into_iter().max()
     }
 
@@ -111,7 +112,7 @@ impl ReportStore {
         let surplus = (numbers.len() + 1).saturating_sub(kept.newest);
         for (index, &number) in numbers.iter().enumerate() {
             if (index < surplus || self.is_older(number, kept.age))
-                && let Err(error) = fs::remove_file(self.path(number))
+                && let Err(error) = self.state.remove(&self.path(number))
             {
                 tracing::warn!(run = number, %error, "an old report cannot be deleted");
             }

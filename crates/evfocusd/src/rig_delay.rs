@@ -2,13 +2,13 @@
 
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use evfocus_core::DelayModel;
 use evfocus_ipc::Error;
 use serde::{Deserialize, Serialize};
 
-use crate::storage::write_json;
+use crate::storage::StateDirectory;
 
 /// The value of [`Learnt::format`] that this version writes and reads.
 const FORMAT: u64 = 1;
@@ -16,7 +16,8 @@ const MICROS: f64 = 1e6;
 
 /// The file in the state directory.
 #[derive(Debug, Clone)]
-pub(crate) struct RigDelayFile {
+pub struct RigDelayFile {
+    state: StateDirectory,
     path: PathBuf,
     camera: String,
     lens: String,
@@ -38,13 +39,14 @@ struct Learnt {
 }
 
 impl RigDelayFile {
-    /// The file in `state_dir` for the rig of this camera and lens, model and serial each.
-    pub(crate) fn new(state_dir: &Path, camera: &str, lens: &str) -> Self {
-        Self { path: state_dir.join("rig-delay.json"), camera: camera.to_owned(), lens: lens.to_owned() }
+    /// The file in `state` for the rig of this camera and lens, model and serial each.
+    pub fn new(state: &StateDirectory, camera: &str, lens: &str) -> Self {
+        let (camera, lens) = (camera.to_owned(), lens.to_owned());
+        Self { state: state.clone(), path: state.path("rig-delay.json"), camera, lens }
     }
 
     /// What was learnt with the same camera and lens. A file that cannot be used costs no more than learning anew.
-    pub(crate) fn read(&self) -> Option<DelayModel> {
+    pub fn read(&self) -> Option<DelayModel> {
         let text = match fs::read(&self.path) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
@@ -82,8 +84,8 @@ impl RigDelayFile {
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the file; what was there before stays.
-    pub(crate) fn write(&self, delays: &DelayModel) -> Result<(), Error> {
-        write_json(
+    pub fn write(&self, delays: &DelayModel) -> Result<(), Error> {
+        self.state.write_json(
             &self.path,
             &Learnt {
                 format: FORMAT,
@@ -136,7 +138,7 @@ mod tests {
     #[test]
     fn what_was_learnt_is_there_again_for_the_same_rig_only() {
         let folder = tempfile::tempdir().unwrap();
-        let file = RigDelayFile::new(folder.path(), "camera 1", "lens 1");
+        let file = RigDelayFile::new(&StateDirectory::new(folder.path()), "camera 1", "lens 1");
         assert_eq!(file.read(), None);
         file.write(&learnt()).unwrap();
         let (kept, expected) = (file.read().unwrap(), learnt());
@@ -146,14 +148,14 @@ mod tests {
             assert!((kept.seconds - expected.seconds).abs() < 1e-12);
             assert!((kept.uncertainty_s - expected.uncertainty_s).abs() < 1e-12);
         }
-        assert_eq!(RigDelayFile::new(folder.path(), "camera 2", "lens 1").read(), None);
-        assert_eq!(RigDelayFile::new(folder.path(), "camera 1", "lens 2").read(), None);
+        assert_eq!(RigDelayFile::new(&StateDirectory::new(folder.path()), "camera 2", "lens 1").read(), None);
+        assert_eq!(RigDelayFile::new(&StateDirectory::new(folder.path()), "camera 1", "lens 2").read(), None);
     }
 
     #[test]
     fn a_damaged_file_is_learnt_anew_and_written_over() {
         let folder = tempfile::tempdir().unwrap();
-        let file = RigDelayFile::new(folder.path(), "camera 1", "lens 1");
+        let file = RigDelayFile::new(&StateDirectory::new(folder.path()), "camera 1", "lens 1");
         file.write(&learnt()).unwrap();
         let path = folder.path().join("rig-delay.json");
         let good = fs::read_to_string(&path).unwrap();

@@ -4,14 +4,16 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, Input, Refusal, Snapshot};
+use evfocus_core::controller::{Accepted, Action, Command, FocusRequest, Input, Pace, Refusal, Snapshot};
 use evfocus_core::{Controller, CurvePoint, EventBatch, HostMicros, LensPosition, RunReport};
 use evfocus_hal::{Camera, Clock, DeviceError, Lens, VirtualClock};
-use evfocus_ipc::Calibration;
+use evfocus_ipc::{self as ipc, Calibration};
 
 use crate::calibration::{CalibrationFailure, Desk};
 use crate::config::Config;
 use crate::devices::{self, Devices};
+use crate::threads::control::EndedRun;
+use crate::wire;
 
 /// Virtual time from one look at the camera to the next: the period of the simulated link's transfers.
 const STEP: Duration = Duration::from_millis(1);
@@ -162,6 +164,24 @@ impl VirtualRig {
         let accepted = self.controller.command(command, now, &mut self.actions)?;
         self.perform();
         Ok(accepted)
+    }
+
+    /// The record of the last run as the daemon would write it to its state directory, had `pace` been asked for and were it 1970.
+    pub fn written_report(&self, pace: Pace) -> Option<ipc::Report> {
+        let (camera, lens) = (self.camera.info(), self.lens.info());
+        let devices = ipc::RunDevices {
+            camera: devices::name(&camera.model, &camera.serial),
+            lens: devices::name(&lens.model, &lens.serial),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        };
+        let report = self.controller.report()?.clone();
+        let ended = EndedRun { report, delays: self.controller.delays(), pace };
+        Some(wire::report(&ended, wire::Circumstances { started_unix_s: 0.0, devices, calibration: None }))
+    }
+
+    /// Lets `duration` pass without looking at anything, as when the computer has no time for the daemon.
+    pub fn starve(&mut self, duration: Duration) {
+        self.clock.advance_to(self.clock.now() + duration);
     }
 
     /// Lets a millisecond pass.

@@ -13,7 +13,7 @@ use hil_sim::{SimCamera, SimLens};
 
 /// A fault, and from when to when it lasts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Spell<Kind> {
+pub(super) struct Spell<Kind> {
     /// What.
     pub kind: Kind,
     /// From when.
@@ -22,7 +22,7 @@ pub struct Spell<Kind> {
     pub until: HostMicros,
 }
 
-fn current<Kind: Copy>(script: &[Spell<Kind>], now: HostMicros) -> Option<Kind> {
+pub(super) fn current<Kind: Copy>(script: &[Spell<Kind>], now: HostMicros) -> Option<Kind> {
     script.iter().find(|spell| spell.from <= now && now < spell.until).map(|spell| spell.kind)
 }
 
@@ -41,6 +41,17 @@ pub enum CameraFault {
     Lies,
     /// Its clock runs a tenth too fast.
     ClockRuns,
+    /// Its clock is a hundred hours ahead.
+    ClockLeaps,
+}
+
+/// A hundred hours, microseconds: more than the events of one list may lie apart.
+const LEAP_US: i64 = 360_000_000_000;
+
+fn shift_time(batch: &mut EventBatch, shifted: impl Fn(i64) -> i64) {
+    let shift = |event: Event| Event { t: CameraMicros(shifted(event.t.0)), ..event };
+    replace(batch, |events| events.into_iter().map(shift).collect());
+    batch.reached = batch.reached.map(|reached| CameraMicros(shifted(reached.0)));
 }
 
 /// What a lens may do wrong.
@@ -67,7 +78,7 @@ impl LensFault {
 
 /// What passed through the devices.
 #[derive(Debug)]
-pub struct Witness {
+pub(super) struct Witness {
     range: LensRange,
     /// Events handed over, and events said to be lost.
     events: AtomicU64,
@@ -151,11 +162,8 @@ impl FaultyCamera {
                 };
                 replace(batch, |events| events.into_iter().enumerate().map(lies).collect());
             }
-            CameraFault::ClockRuns => {
-                let runs = |event: Event| Event { t: CameraMicros(event.t.0 + event.t.0 / 10), ..event };
-                replace(batch, |events| events.into_iter().map(runs).collect());
-                batch.reached = batch.reached.map(|reached| CameraMicros(reached.0 + reached.0 / 10));
-            }
+            CameraFault::ClockRuns => shift_time(batch, |t| t + t / 10),
+            CameraFault::ClockLeaps => shift_time(batch, |t| t + LEAP_US),
             CameraFault::Flood | CameraFault::Unplugged | CameraFault::Silent | CameraFault::Hiccup => {}
         }
     }
@@ -181,7 +189,8 @@ impl Camera for FaultyCamera {
                 | CameraFault::Hiccup
                 | CameraFault::Flood
                 | CameraFault::Lies
-                | CameraFault::ClockRuns,
+                | CameraFault::ClockRuns
+                | CameraFault::ClockLeaps,
             )
             | None => self.inner.start(),
         }
@@ -197,7 +206,13 @@ impl Camera for FaultyCamera {
         match fault {
             Some(CameraFault::Unplugged) => return Err(Self::error(DeviceErrorKind::Disconnected)),
             Some(CameraFault::Hiccup) => return Err(Self::error(DeviceErrorKind::Fault)),
-            Some(CameraFault::Silent | CameraFault::Flood | CameraFault::Lies | CameraFault::ClockRuns)
+            Some(
+                CameraFault::Silent
+                | CameraFault::Flood
+                | CameraFault::Lies
+                | CameraFault::ClockRuns
+                | CameraFault::ClockLeaps,
+            )
             | None => {}
         }
         self.inner.read(batch, timeout)?;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use evfocus_core::controller::{Accepted, Command, FocusState};
+use evfocus_core::controller::{Accepted, Command, FocusState, Mode, PauseState, Snapshot};
 use evfocus_core::{HostMicros, LensPosition, Outcome, RunId};
 use evfocusd::VirtualRig;
 
@@ -17,12 +17,17 @@ const STILL_AFTER: Duration = Duration::from_millis(2500);
 const MOTION: Duration = Duration::from_secs(8);
 /// Slower than this, counts in a millisecond, the glass stands still; backlash and vibration are not motions.
 const STILL: f64 = 0.2;
+/// What a trial may ask for beyond what it holds at the start, bytes: curves, reports, and what the simulated link holds back.
+const MOST_GROWN: i64 = 16 << 20;
 
 /// Watches a trial.
 #[derive(Debug, Default)]
 pub(super) struct Judge {
     outcomes: Vec<&'static str>,
     broken: Vec<String>,
+    /// A run has ended, and nobody has taken note.
+    ended: bool,
+    grown: i64,
     run: Option<(RunId, HostMicros)>,
     /// From when on the lens has no reason to move.
     idle_since: Option<HostMicros>,
@@ -58,6 +63,7 @@ impl Judge {
     pub(super) fn watch(&mut self, rig: &VirtualRig, witness: &Witness, age: Duration) {
         let now = rig.now();
         self.note_end(rig);
+        self.note_beginning(&rig.controller().snapshot(), now);
         if let Some((run, since)) = self.run
             && now.since(since) > LONGEST_RUN
         {
@@ -83,6 +89,16 @@ impl Judge {
         }
     }
 
+    /// Whether a run has begun by itself, and whether it may.
+    fn note_beginning(&mut self, snapshot: &Snapshot, now: HostMicros) {
+        let Some(run) = snapshot.run.filter(|_| self.run.is_none()) else { return };
+        self.run = Some((run, now));
+        if (snapshot.mode, snapshot.pause) != (Mode::Continuous, PauseState::Running) {
+            let Snapshot { mode, pause, .. } = snapshot;
+            self.broken.push(format!("run {run} has begun by itself, in mode {mode:?} and {pause:?}"));
+        }
+    }
+
     /// Whether a run has ended, and with a report.
     fn note_end(&mut self, rig: &VirtualRig) {
         let Some((run, _)) = self.run else { return };
@@ -91,6 +107,7 @@ impl Judge {
             return;
         }
         self.run = snapshot.run.map(|next| (next, rig.now()));
+        self.ended = true;
         match rig.controller().report().filter(|report| report.id == run) {
             Some(report) => self.outcomes.push(match report.outcome {
                 Outcome::Focused { .. } => "focused",
@@ -116,12 +133,36 @@ impl Judge {
         }
     }
 
+    /// Whether a run has ended since this was asked last.
+    pub(super) fn take_ended(&mut self) -> bool {
+        std::mem::take(&mut self.ended)
+    }
+
+    /// Memory has grown by so many bytes.
+    pub(super) fn weigh(&mut self, grown: i64) {
+        if grown > MOST_GROWN && self.grown <= MOST_GROWN {
+            self.broken.push(format!("memory has grown by {} MiB", grown >> 20));
+        }
+        self.grown = self.grown.max(grown);
+    }
+
+    /// What is wrong elsewhere.
+    pub(super) fn blame(&mut self, wrong: Vec<String>) {
+        self.broken.extend(wrong);
+    }
+
+    /// Time has gone by in which nothing was looked at, and the lens could not be stopped.
+    pub(super) fn starved(&mut self) {
+        (self.idle_since, self.glass) = (None, None);
+    }
+
     /// The process was killed: its run has no end.
     pub(super) fn killed(&mut self) {
         if self.run.take().is_some() {
             self.outcomes.push("killed");
         }
         (self.idle_since, self.moving_until, self.glass) = (None, None, None);
+        self.ended = false;
     }
 
     /// Whether no run is under way and the lens has had its time to come to rest.
@@ -134,8 +175,9 @@ impl Judge {
         self.broken.len() > 3
     }
 
-    pub(super) fn verdict(self) -> Ended {
-        Ended { outcomes: self.outcomes, broken: self.broken }
+    pub(super) fn verdict(self, lasted: Duration) -> Ended {
+        let grown = self.grown.max(0).unsigned_abs();
+        Ended { outcomes: self.outcomes, broken: self.broken, lasted, grown }
     }
 }
 
@@ -152,7 +194,7 @@ mod tests {
 
     fn rig() -> (VirtualRig, Arc<Witness>) {
         let mut config = Config::simulated().unwrap();
-        config.rig.sensor.geometry = super::super::GEOMETRY;
+        config.rig.sensor.geometry = super::super::draw::GEOMETRY;
         let witness = Arc::new(Witness::new(config.rig.lens.range));
         let rig = VirtualRig::with_devices(&config, |rig, clock| {
             let (camera, lens) = rig.devices();

@@ -2,27 +2,28 @@
 
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use evfocus_ipc::{CALIBRATION_FORMAT, Calibration, Error};
 
-use crate::storage::write_json;
+use crate::storage::StateDirectory;
 
 /// The file in the state directory.
 #[derive(Debug, Clone)]
-pub(crate) struct CalibrationFile {
+pub struct CalibrationFile {
+    state: StateDirectory,
     path: PathBuf,
     lens: String,
 }
 
 impl CalibrationFile {
-    /// The file in `state_dir` for `lens`, model and serial.
-    pub(crate) fn new(state_dir: &Path, lens: &str) -> Self {
-        Self { path: state_dir.join("lens-calibration.json"), lens: lens.to_owned() }
+    /// The file in `state` for `lens`, model and serial.
+    pub fn new(state: &StateDirectory, lens: &str) -> Self {
+        Self { state: state.clone(), path: state.path("lens-calibration.json"), lens: lens.to_owned() }
     }
 
     /// What was measured of this lens. A file that cannot be used costs no more than a lens that is not calibrated.
-    pub(crate) fn read(&self) -> Option<Calibration> {
+    pub fn read(&self) -> Option<Calibration> {
         let path = self.path.display();
         let text = match fs::read(&self.path) {
             Ok(text) => text,
@@ -53,8 +54,8 @@ impl CalibrationFile {
     ///
     /// # Errors
     /// [`Error::StorageFailed`], naming the file; what was there before stays.
-    pub(crate) fn write(&self, calibration: &Calibration) -> Result<(), Error> {
-        write_json(&self.path, calibration)
+    pub fn write(&self, calibration: &Calibration) -> Result<(), Error> {
+        self.state.write_json(&self.path, calibration)
     }
 }
 
@@ -108,17 +109,17 @@ mod tests {
     #[test]
     fn it_is_there_again_for_the_same_lens_only() {
         let folder = tempfile::tempdir().unwrap();
-        let file = CalibrationFile::new(folder.path(), "lens 1");
+        let file = CalibrationFile::new(&StateDirectory::new(folder.path()), "lens 1");
         assert_eq!(file.read(), None);
         file.write(&measured()).unwrap();
         assert_eq!(file.read(), Some(measured()));
-        assert_eq!(CalibrationFile::new(folder.path(), "lens 2").read(), None);
+        assert_eq!(CalibrationFile::new(&StateDirectory::new(folder.path()), "lens 2").read(), None);
     }
 
     #[test]
     fn a_damaged_file_does_not_count() {
         let folder = tempfile::tempdir().unwrap();
-        let file = CalibrationFile::new(folder.path(), "lens 1");
+        let file = CalibrationFile::new(&StateDirectory::new(folder.path()), "lens 1");
         file.write(&measured()).unwrap();
         let path = folder.path().join("lens-calibration.json");
         let good = fs::read_to_string(&path).unwrap();
