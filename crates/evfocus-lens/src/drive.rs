@@ -157,9 +157,9 @@ impl Drive {
         Self { config, aim, state: State::Rest, readings: [0.0; READINGS], count: 0, last: None }
     }
 
-    /// The readings have steps of so many counts. Their noise tells something of what lies between the steps, but not much.
+    /// The readings have steps of so many counts. A lens that is driven nearer than half of one hunts.
     pub(crate) fn set_resolution(&mut self, step: f64) {
-        self.aim = (AIM * self.config.tolerance).max(step.abs() / 4.0).min(self.config.tolerance);
+        self.aim = (AIM * self.config.tolerance).max(step.abs() / 2.0).min(self.config.tolerance);
     }
 
     pub(crate) fn config(&self) -> &DriveConfig {
