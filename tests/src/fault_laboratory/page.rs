@@ -26,7 +26,7 @@ moments; a quarter of the trials are in continuous mode. Whatever goes wrong:
 - whatever becomes of a write, what was said to be written is there and can be read, and so is all else in the state directory.
 
 What clients may do to the socket is judged by `crates/evfocusd/tests/crowd.rs`, also in virtual time: the status is answered within
-100 ms. The real process is put to the test by `crates/evfocusd/tests/faults.rs`.
+100 ms. The real process is put to the test by `crates/evfocusd/tests/process`.
 ";
 
 /// The page on `rows`, which are of consecutive seeds.
