@@ -146,14 +146,15 @@ mod tests {
     #[test]
     fn a_users_refusals_take_one_line_of_the_log() {
         let access = access(&["4000"], &[]);
-        let log = std::sync::Arc::new(Mutex::new(Vec::new()));
-        let subscriber = tracing_subscriber::fmt().with_writer(std::sync::Arc::clone(&log)).finish();
+        let log = tempfile::NamedTempFile::new().unwrap();
+        let writer = Mutex::new(log.reopen().unwrap());
+        let subscriber = tracing_subscriber::fmt().with_writer(writer).finish();
         tracing::subscriber::with_default(subscriber, || {
             for stranger in [4001, 4001, 4002, 4001, 4002] {
                 access.check(peer(stranger, 1), "Focus").unwrap_err();
             }
         });
-        let log = String::from_utf8(log.lock().unwrap().clone()).unwrap();
+        let log = std::fs::read_to_string(log.path()).unwrap();
         assert_eq!(log.lines().count(), 2, "{log}");
     }
 
