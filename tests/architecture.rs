@@ -196,3 +196,28 @@ fn exceptions_to_lints_carry_reasons() -> Result<()> {
     }
     Ok(())
 }
+
+#[test]
+fn the_security_page_names_what_there_is() -> Result<()> {
+    let mut code = String::new();
+    for folder in ["crates", "hil-sim", "tests"] {
+        for path in sources(&root().join(folder))? {
+            code += &std::fs::read_to_string(path)?;
+        }
+    }
+    let page = std::fs::read_to_string(root().join("docs/security.md"))?;
+    let (mut files, mut tests) = (0, 0);
+    for name in page.split('`').skip(1).step_by(2) {
+        let is_file = ["evfocus", "tests/", "config/", "fuzz/"].iter().any(|start| name.starts_with(start));
+        if is_file && name.contains('/') && !name.contains(' ') {
+            files += 1;
+            let is_there = [root(), root().join("crates")].iter().any(|folder| folder.join(name).exists());
+            assert!(is_there, "there is no {name}");
+        } else if name.matches('_').count() > 2 && name.chars().all(|c| c == '_' || c.is_ascii_lowercase()) {
+            tests += 1;
+            assert!(code.contains(&format!("fn {name}(")), "there is no test {name}");
+        }
+    }
+    assert!(files > 15 && tests > 10, "{files} files and {tests} tests are named");
+    Ok(())
+}

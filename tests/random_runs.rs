@@ -23,6 +23,18 @@ fn random_runs_end_in_focus_or_with_the_right_reason() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn runs_that_start_by_themselves_end_likewise() -> Result<()> {
+    for seed in 2000..2006 {
+        let trial = Trial::draw(seed)?.in_continuous_mode();
+        let ended = trial.run()?;
+        let verdict = ended.verdict(&trial);
+        println!("seed {seed}: {}, {}, error {:?}", verdict.title(), ended.reason(), ended.error);
+        assert!(!matches!(verdict, Verdict::Wrong | Verdict::Misled), "seed {seed}: {}", ended.reason());
+    }
+    Ok(())
+}
+
 /// Fronts of houses that go by: what is at one height is sharp in other bins than what is at another, because they pass in turns.
 #[test]
 fn readings_that_contradict_each_other_are_unsure() -> Result<()> {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use evfocus_core::controller::{FocusRequest, FocusState, Pace};
+use evfocus_core::controller::{Command, FocusRequest, FocusState, Mode, Pace};
 use evfocus_core::{Geometry, LensPosition, LensSpeed, Outcome, RunReport};
 use evfocusd::{Config, VirtualRig};
 use hil_sim::{
@@ -117,6 +117,8 @@ pub struct Trial {
     pub request: FocusRequest,
     /// What stands in the way.
     pub hindrance: Hindrance,
+    /// Whether nobody asks, and the run starts by itself.
+    pub is_continuous: bool,
 }
 
 fn pick<T: Copy>(draw: &mut impl Rng, of: &[T], otherwise: T) -> T {
@@ -142,7 +144,13 @@ impl Trial {
             if hindrance == Hindrance::LatePositions { &[Pace::Normal, Pace::Accurate] } else { &Pace::ALL };
         let request = FocusRequest { pace: Some(pick(draw, paces, Pace::Normal)), ..FocusRequest::default() };
         plant(hindrance, &mut config, draw);
-        Ok(Self { config, request, hindrance })
+        Ok(Self { config, request, hindrance, is_continuous: false })
+    }
+
+    /// The same in continuous mode, where a run is made as configured.
+    #[must_use]
+    pub fn in_continuous_mode(self) -> Self {
+        Self { request: FocusRequest::default(), is_continuous: true, ..self }
     }
 
     /// Makes the run.
@@ -151,7 +159,12 @@ impl Trial {
     /// A rig that is refused, or a run that does not end.
     pub fn run(&self) -> Result<Ended> {
         let mut rig = VirtualRig::new(&self.config)?;
-        rig.command(evfocus_core::controller::Command::Focus(self.request))?;
+        if self.is_continuous {
+            rig.command(Command::SetMode(Mode::Continuous))?;
+            rig.step();
+        } else {
+            rig.command(Command::Focus(self.request))?;
+        }
         let latest = rig.now() + LONGEST_RUN;
         while rig.controller().snapshot().state == FocusState::Scanning {
             anyhow::ensure!(rig.now() < latest, "the run hangs: {:?}", rig.controller().snapshot());

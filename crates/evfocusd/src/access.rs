@@ -144,6 +144,21 @@ mod tests {
     }
 
     #[test]
+    fn a_users_refusals_take_one_line_of_the_log() {
+        let access = access(&["4000"], &[]);
+        let log = tempfile::NamedTempFile::new().unwrap();
+        let writer = Mutex::new(log.reopen().unwrap());
+        let subscriber = tracing_subscriber::fmt().with_writer(writer).finish();
+        tracing::subscriber::with_default(subscriber, || {
+            for stranger in [4001, 4001, 4002, 4001, 4002] {
+                access.check(peer(stranger, 1), "Focus").unwrap_err();
+            }
+        });
+        let log = std::fs::read_to_string(log.path()).unwrap();
+        assert_eq!(log.lines().count(), 2, "{log}");
+    }
+
+    #[test]
     fn an_empty_list_shuts_everybody_out_but_root() {
         access(&[], &[]).check(peer(4321, 4321), "Focus").unwrap_err();
     }

@@ -26,7 +26,7 @@ moments; a quarter of the trials are in continuous mode. Whatever goes wrong:
 - whatever becomes of a write, what was said to be written is there and can be read, and so is all else in the state directory.
 
 What clients may do to the socket is judged by `crates/evfocusd/tests/crowd.rs`, also in virtual time: the status is answered within
-100 ms. The real process is put to the test by `crates/evfocusd/tests/faults.rs`.
+100 ms. The real process is put to the test by `crates/evfocusd/tests/process`.
 ";
 
 /// The page on `rows`, which are of consecutive seeds.
@@ -36,19 +36,21 @@ pub fn page(rows: &[Row]) -> String {
     let runs: usize = rows.iter().map(|row| row.outcomes.len()).sum();
     let hours = rows.iter().map(|row| row.lasted).sum::<Duration>().as_secs_f64() / 3600.0;
     let grown = rows.iter().map(|row| row.grown).max().unwrap_or(0) as f64 / f64::from(1 << 20);
-    let of_broken: String = broken.iter().map(|row| format!("- {}\n", row.complaint())).collect();
-    let found: String = FOUND
+    let of_broken: Vec<String> = broken.iter().map(|row| format!("- {}\n", row.complaint())).collect();
+    let found: Vec<String> = FOUND
         .iter()
         .map(|found| format!("| {} | {} | {} |\n", found.seed, found.wrong, found.mended))
         .collect();
     format!(
         "{HEAD} {first}..{}`.\n\n{JUDGED}\n**{} trials, seeds {first} to {last}; {} broke an invariant.** {runs} runs in {hours:.1} \
-         hours of virtual time; memory grew by {grown:.1} MiB at the most.\n\n{of_broken}\n{}\n## What it found on the way\n\n\
-         | seed | what was wrong | what was done |\n| ---: | --- | --- |\n{found}",
+         hours of virtual time; memory grew by {grown:.1} MiB at the most.\n\n{}\n{}\n## What it found on the way\n\n\
+         | seed | what was wrong | what was done |\n| ---: | --- | --- |\n{}",
         last + 1,
         rows.len(),
         broken.len(),
+        of_broken.concat(),
         table(rows),
+        found.concat(),
     )
 }
 
@@ -72,9 +74,10 @@ fn table(rows: &[Row]) -> String {
     let mut table = "A trial with several mishaps stands in several rows.\n\n| what went wrong | trials | how the runs ended |\n\
                      | --- | ---: | --- |\n"
         .to_owned();
-    for (mishap, (trials, outcomes)) in counts {
-        table += &format!("| {mishap} | {trials} | {} |\n", list(outcomes));
-    }
+    let lines = counts
+        .into_iter()
+        .map(|(mishap, (trials, outcomes))| format!("| {mishap} | {trials} | {} |\n", list(outcomes)));
+    table.extend(lines);
     table + &format!("| **all** | {} | {} |\n", rows.len(), list(all))
 }
 
