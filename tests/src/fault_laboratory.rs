@@ -7,7 +7,6 @@
 mod devices;
 mod disk;
 mod draw;
-mod found;
 mod judge;
 mod memory;
 mod mishap;
@@ -31,7 +30,6 @@ use disk::{Death, DiskFault, FaultyDisk};
 use judge::Judge;
 use shelf::{Keeper, Shelf};
 
-pub use found::FOUND;
 pub use mishap::Mishap;
 
 /// What the service manager waits before it tries to start the process again.

@@ -4,7 +4,6 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::found::FOUND;
 use super::record::Row;
 
 const HEAD: &str = "\
@@ -29,6 +28,12 @@ What clients may do to the socket is judged by `crates/evfocusd/tests/crowd.rs`,
 100 ms. The real process is put to the test by `crates/evfocusd/tests/process`.
 ";
 
+/// With earlier draws than today's.
+const FOUND: &str = "\
+Nothing in the daemon. Seed 372 of earlier draws, a camera that is away when the process starts again, made no run and was let through:
+a gap in the judging, since closed.
+";
+
 /// The page on `rows`, which are of consecutive seeds.
 pub fn page(rows: &[Row]) -> String {
     let (first, last) = (rows.first().map_or(0, |row| row.seed), rows.last().map_or(0, |row| row.seed));
@@ -37,20 +42,14 @@ pub fn page(rows: &[Row]) -> String {
     let hours = rows.iter().map(|row| row.lasted).sum::<Duration>().as_secs_f64() / 3600.0;
     let grown = rows.iter().map(|row| row.grown).max().unwrap_or(0) as f64 / f64::from(1 << 20);
     let of_broken: Vec<String> = broken.iter().map(|row| format!("- {}\n", row.complaint())).collect();
-    let found: Vec<String> = FOUND
-        .iter()
-        .map(|found| format!("| {} | {} | {} |\n", found.seed, found.wrong, found.mended))
-        .collect();
     format!(
         "{HEAD} {first}..{}`.\n\n{JUDGED}\n**{} trials, seeds {first} to {last}; {} broke an invariant.** {runs} runs in {hours:.1} \
-         hours of virtual time; memory grew by {grown:.1} MiB at the most.\n\n{}\n{}\n## What it found on the way\n\n\
-         | seed | what was wrong | what was done |\n| ---: | --- | --- |\n{}",
+         hours of virtual time; memory grew by {grown:.1} MiB at the most.\n\n{}\n{}\n## What it found on the way\n\n{FOUND}",
         last + 1,
         rows.len(),
         broken.len(),
         of_broken.concat(),
         table(rows),
-        found.concat(),
     )
 }
 
