@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use evfocus_core::controller::FocusRequest;
-use evfocus_core::{HostMicros, LensPosition, LensSpeed, Outcome};
+use evfocus_core::{HostMicros, LensPosition, LensRange, LensSpeed, Outcome};
 use evfocus_ipc::Calibration;
 use evfocus_tests::lenses::{config, section};
 use evfocusd::VirtualRig;
@@ -190,13 +190,86 @@ fn a_fault_on_the_way_ends_it_with_its_name_and_the_lens_stopped() -> Result<()>
 }
 
 #[test]
-fn an_end_of_the_way_within_the_limits_is_found_and_kept_to() -> Result<()> {
-    // The model's motor counts on where it stands at the end of its way; one that tells where it is does not.
+fn soft_limits_are_kept_to() -> Result<()> {
     let mut config = config(section("indi")?, 1)?;
     config.lens_max = Some(LensPosition(3000.0));
     let mut rig = VirtualRig::new(&config)?;
     let known = rig.calibrate().map_err(|failure| anyhow::anyhow!("{failure:?}"))?;
-    assert!((known.range.max - 3000.0).abs() < 2.0, "soft limits are kept to: {known:?}");
+    assert!((known.range.max - 3000.0).abs() < 2.0, "{known:?}");
     assert!(rig.now() > HostMicros(0));
+    Ok(())
+}
+
+/// A rig whose lens comes to the ends of its way, at 400 and 3300 counts, before its limits.
+fn too_short(name: &str) -> Result<VirtualRig> {
+    let mut config = config(section(name)?, 1)?;
+    config.rig.lens.ends = Some(LensRange::new(LensPosition(400.0), LensPosition(3300.0))?);
+    config.rig.lens.start = LensPosition(1000.0);
+    Ok(VirtualRig::new(&config)?)
+}
+
+#[test]
+fn a_lens_that_reads_its_position_finds_the_ends_of_its_way_and_keeps_off_them() -> Result<()> {
+    for name in ["firmata", "labjack"] {
+        let mut rig = too_short(name)?;
+        let known = rig.calibrate().map_err(|failure| anyhow::anyhow!("{name}: {failure:?}"))?;
+        println!("{name}: {known:?}");
+        assert!((400.0..440.0).contains(&known.range.min), "{known:?}");
+        assert!((3260.0..3300.0).contains(&known.range.max), "{known:?}");
+        assert_eq!(
+            known.notes.iter().filter(|note| note.contains("an end of its way")).count(),
+            2,
+            "{known:?}"
+        );
+        assert!((known.speed_counts_per_s / 900.0 - 1.0).abs() < 0.02, "{known:?}");
+        assert!(known.backlash.is_some(), "{known:?}");
+        // Runs keep off them too.
+        let report = rig.focus(FocusRequest::default(), |_, _, _| {})?;
+        let truth = *rig.truth().first().context("a truth")?;
+        let Outcome::Focused { position } = report.outcome else { anyhow::bail!("{:?}", report.outcome) };
+        println!("{name}: focused at {position}, truth {truth}");
+        assert!(position.distance(truth) < 5.0, "{position} for {truth}");
+    }
+    Ok(())
+}
+
+/// A stepper slips at an end and counts on. Nothing on its line tells; that the ways up and down disagree does.
+#[test]
+fn a_lens_that_counts_steps_and_lost_some_at_an_end_is_not_taken_for_calibrated() -> Result<()> {
+    for name in ["moonlite", "indi"] {
+        let mut rig = too_short(name)?;
+        let Err(failure) = rig.calibrate() else { anyhow::bail!("{name} was calibrated") };
+        println!("{name}: {failure:?}");
+        assert_eq!(failure.reason, "direction-mismatch", "{name}: {failure:?}");
+        assert!(failure.message.contains("narrow lens.min_counts"), "{failure:?}");
+        assert!(goes_on(&mut rig) < 1.0, "{name}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_limit_switch_within_the_limits_ends_it_with_the_lens_stopped() -> Result<()> {
+    let mut rig = too_short("grbl")?;
+    let Err(failure) = rig.calibrate() else { anyhow::bail!("it was calibrated") };
+    println!("{failure:?}: {:?}", rig.lens_error());
+    assert_eq!(failure.reason, "lens-fault", "{failure:?}");
+    assert!(failure.message.contains("narrow lens.min_counts"), "{failure:?}");
+    assert!(rig.lens_error().is_some_and(|error| error.what.contains("ALARM:1")), "{:?}", rig.lens_error());
+    assert!(goes_on(&mut rig) < 1.0);
+    Ok(())
+}
+
+/// An open loop is where it was told to be. All that it can say is that it cannot say it.
+#[test]
+fn a_liquid_lens_that_sticks_is_not_seen_and_the_calibration_says_so() -> Result<()> {
+    let mut config = config(section("optotune")?, 1)?;
+    let trigger = FaultTrigger::AtPosition(LensPosition(1500.0));
+    config.rig.faults = vec![Fault { kind: FaultKind::LensStalled, trigger }];
+    let mut rig = VirtualRig::new(&config)?;
+    let known = rig.calibrate().map_err(|failure| anyhow::anyhow!("{failure:?}"))?;
+    println!("{known:?}");
+    assert!(known.notes.iter().any(|note| note.contains("one that sticks is not seen")), "{known:?}");
+    assert!(known.notes.iter().any(|note| note.contains("play was not measured")), "{known:?}");
+    assert_eq!(known.backlash, None);
     Ok(())
 }

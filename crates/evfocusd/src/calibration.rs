@@ -14,12 +14,15 @@ use evfocus_core::controller::{Accepted, Action, Command, DeviceFailure, FocusRe
 use evfocus_core::{
     Controller, ControllerConfig, Directions, HostMicros, LensPosition, LensSample, LensSpeed, Method,
 };
+use evfocus_hal::{LensClass, LensInfo};
 use evfocus_ipc::{CALIBRATION_FORMAT, Calibration, LensRange};
 
 pub(crate) use desk::Desk;
 pub use file::CalibrationFile;
 use leg::{Leg, Progress};
 use play::{Difference, Play};
+
+use crate::devices;
 
 /// How long the lens stands before it is measured: noise is taken meanwhile.
 const REST: Duration = Duration::from_millis(300);
@@ -36,6 +39,10 @@ const NOTICEABLE: (f64, f64) = (5.0, 0.000_5);
 const PLAY_SPEEDS: [f64; 2] = [0.5, 0.25];
 /// The second of these runs goes at least this far to either side of the peak, as a share of the range.
 const NARROWEST: f64 = 0.12;
+/// What positions and pixels can be late by, seconds: beyond, the two ways of a sweep differ for another reason.
+const PLAUSIBLE_LAG_S: std::ops::RangeInclusive<f64> = -0.01..=0.1;
+/// How far from an end that the lens ran into it is kept, in tolerances of its position.
+const CLEARANCE: f64 = 3.0;
 /// Speeds that differ by more than this share are worth a note.
 const UNEVEN: f64 = 0.05;
 
@@ -90,16 +97,16 @@ pub(crate) struct Calibrator {
 
 impl Calibrator {
     /// Begins with the next [`advance`](Self::advance). The lens goes to the limits of `settings`, at its full speed.
-    pub(crate) fn new(
-        settings: &ControllerConfig,
-        speed_is_share: bool,
-        lens: String,
-        now: HostMicros,
-    ) -> Self {
+    pub(crate) fn new(settings: &ControllerConfig, info: &LensInfo, now: HostMicros) -> Self {
         let limits = settings.limits;
+        let mut notes = Vec::new();
+        if info.class == LensClass::Setpoint {
+            let note = "this lens does not tell where it is: positions are computed from what it was told, and one that sticks is not seen";
+            notes.push(note.to_owned());
+        }
         Self {
             settings: settings.clone(),
-            speed_is_share,
+            speed_is_share: info.speed_is_share,
             step: Step::Begin,
             began_at: None,
             last: None,
@@ -110,7 +117,7 @@ impl Calibrator {
             up: None,
             result: Calibration {
                 format: CALIBRATION_FORMAT,
-                lens,
+                lens: devices::name(&info.model, &info.serial),
                 measured_unix_s: 0.0,
                 range: LensRange { min: limits.min().0, max: limits.max().0 },
                 speed_counts_per_s: 0.0,
@@ -123,7 +130,7 @@ impl Calibrator {
                 backlash: None,
                 backlash_error_bar: None,
                 lag_us: None,
-                notes: Vec::new(),
+                notes,
             },
             failure: None,
         }
@@ -143,8 +150,16 @@ impl Calibrator {
         }
     }
 
-    /// The lens failed.
+    /// The lens failed. One that drove against an end of its way, and noticed, has found it.
     pub(crate) fn lens_failed(&mut self, failure: DeviceFailure) {
+        if let (
+            DeviceFailure::Fault,
+            Step::ToLow(leg) | Step::Up(leg) | Step::Down(leg) | Step::Stopping(leg),
+        ) = (failure, &mut self.step)
+            && leg.block()
+        {
+            return;
+        }
         let (reason, what) = match failure {
             DeviceFailure::Gone => ("lens-lost", "the lens is gone; check its cable"),
             DeviceFailure::Silent => ("lens-silent", "the lens does not answer; check its power and cable"),
@@ -303,12 +318,14 @@ impl Calibrator {
             return None;
         }
         actions.push(Action::StopLens);
+        let clearance = CLEARANCE * self.settings.position_tolerance;
+        let kept = LensPosition(if end == 0 { rest.0 + clearance } else { rest.0 - clearance });
         self.result.notes.push(format!(
-            "the lens stopped at {rest} on its way to {}: an end of its way lies within its limits",
+            "the lens stopped at {rest} on its way to {}: an end of its way lies within its limits; it will go to {kept} at most",
             leg.target
         ));
         if let Some(place) = self.ends.get_mut(end) {
-            *place = rest;
+            *place = kept;
         }
         Some(())
     }
@@ -355,6 +372,15 @@ impl Calibrator {
     ) {
         if let [one, other] = *differences {
             match Play::of(one, other) {
+                Some(play) if !PLAUSIBLE_LAG_S.contains(&play.lag_s) => {
+                    let what = format!(
+                        "the ways up and down disagree by {:.0} counts at {:.0} counts/s and by {:.0} at {:.0}, which is neither play nor lag. A \
+                         lens that counts its steps has lost some, most likely at an end of its way within its limits: narrow \
+                         lens.min_counts and lens.max_counts, and set its position anew",
+                        one.counts, one.speed, other.counts, other.speed
+                    );
+                    return self.fail("direction-mismatch", what);
+                }
                 Some(play) => {
                     self.result.backlash = Some(play.counts.max(0.0));
                     self.result.backlash_error_bar = Some(play.error_bar);

@@ -12,7 +12,9 @@ use crate::names::named;
 pub struct LensConfig {
     /// Positions that the lens accepts. Default 220 to 3750.
     pub range: LensRange,
-    /// Where the lens stands at first; in the range. Default 220.
+    /// Where the way of the shaft ends before that of the positions does: the motor slips there and counts on. Default nowhere.
+    pub ends: Option<LensRange>,
+    /// Where the lens stands at first; in the range and between the ends. Default 220.
     pub start: LensPosition,
     /// Fastest travel, counts per second. Default 1765: the range in 2 s.
     pub max_speed: LensSpeed,
@@ -96,7 +98,10 @@ impl LensConfig {
 
     pub(crate) fn validate(&self) -> Result<(), ConfigError> {
         let positive = f64::MIN_POSITIVE;
-        ConfigError::check("lens.start", self.start.0, self.range.min().0, self.range.max().0)?;
+        let way = self.ends.unwrap_or(self.range);
+        let lowest = self.range.min().0.max(way.min().0);
+        let highest = self.range.max().0.min(way.max().0);
+        ConfigError::check("lens.start", self.start.0, lowest, highest)?;
         ConfigError::check("lens.acceleration", self.acceleration, 1.0, 1e9)?;
         ConfigError::check("lens.backlash", self.backlash, 0.0, self.range.length())?;
         ConfigError::check("lens.overshoot", self.overshoot, 0.0, self.range.length())?;
@@ -123,6 +128,7 @@ impl Default for LensConfig {
             (LensRange::new(min, max).expect("ordered"), LensSpeed::new(1765.0).expect("positive"));
         Self {
             range,
+            ends: None,
             start: min,
             max_speed,
             acceleration: 20_000.0,

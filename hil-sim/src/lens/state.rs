@@ -118,6 +118,21 @@ impl LensState {
 
     /// What the lens answers to a question that belongs to `seconds`: position and whether it moves.
     pub(crate) fn report(&mut self, seconds: f64) -> (f64, bool) {
+        (self.read(seconds, |instant| instant.motor), self.at(seconds).moving)
+    }
+
+    /// What a potentiometer on the shaft says at `seconds`.
+    pub(crate) fn wiper(&mut self, seconds: f64) -> f64 {
+        self.read(seconds, |instant| instant.shaft)
+    }
+
+    /// How far the motor has slipped by `seconds`, counts.
+    pub(crate) fn slip(&self, seconds: f64) -> f64 {
+        let instant = self.at(seconds);
+        instant.motor - instant.shaft
+    }
+
+    fn read(&mut self, seconds: f64, value: fn(&LensInstant) -> f64) -> f64 {
         let late = self.struck(seconds).filter_map(|(kind, _)| match kind {
             FaultKind::LensPositionLate { by } => Some(by.as_secs_f64()),
             FaultKind::CameraUnplugged
@@ -129,11 +144,9 @@ impl LensState {
         });
         let lag = late.fold(self.config.read_lag.as_secs_f64(), f64::max);
         let then = self.at(seconds - lag);
-        let moving = self.at(seconds).moving;
         let noise: f64 = self.rng.sample(StandardNormal);
-        let position = then.motor + self.config.read_noise * noise;
+        let position = value(&then) + self.config.read_noise * noise;
         let step = self.config.read_resolution;
-        let position = if step > 0.0 { (position / step).round() * step } else { position };
-        (position, moving)
+        if step > 0.0 { (position / step).round() * step } else { position }
     }
 }

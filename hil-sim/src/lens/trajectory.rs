@@ -12,14 +12,22 @@ const MOTIONS_KEPT: usize = 4096;
 /// Motor and optics at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LensInstant {
-    /// What the lens's own encoder sees, counts.
+    /// What the motor's controller counts.
     pub(crate) motor: f64,
-    /// Where the glass is, counts: the motor plus what of the backlash is taken up the other way.
+    /// Where the shaft is, counts: where the motor says, unless it has slipped at an end of the way. A potentiometer on it sees this.
+    pub(crate) shaft: f64,
+    /// Where the glass is, counts: the shaft plus what of the backlash is taken up the other way.
     pub(crate) optics: f64,
     /// Counts per second of the motor, before ripple and sticking.
     pub(crate) velocity: f64,
     /// Whether the motor's controller thinks that a motion is under way.
     pub(crate) moving: bool,
+}
+
+impl LensInstant {
+    fn resting_at(position: f64) -> Self {
+        Self { motor: position, shaft: position, optics: position, velocity: 0.0, moving: false }
+    }
 }
 
 /// One command and what the motor makes of it.
@@ -29,8 +37,8 @@ struct Motion {
     start: f64,
     /// Where the motor stands before the first phase and after the last, and the optics with it.
     from: LensInstant,
-    /// Each phase with the profile time and the optics position at its start.
-    phases: Vec<(f64, f64, Phase)>,
+    /// Each phase with the profile time, and motor and optics, at its start.
+    phases: Vec<(f64, LensInstant, Phase)>,
     rest: LensInstant,
     /// Seconds of profile time.
     duration: f64,
@@ -52,12 +60,29 @@ pub(crate) enum Command {
     Swing(Spring),
 }
 
+/// What lies between motor and glass.
+#[derive(Debug, Clone, Copy)]
+struct Gear {
+    backlash: f64,
+    /// The ends of the shaft's way.
+    ends: (f64, f64),
+}
+
+impl Gear {
+    /// From `before`, after the motor came to `motor` without turning round. Upwards the shaft pushes the glass along; downwards the gap
+    /// must close first.
+    fn turn(self, before: LensInstant, motor: f64) -> LensInstant {
+        let shaft = (before.shaft + motor - before.motor).clamp(self.ends.0, self.ends.1);
+        LensInstant { motor, shaft, optics: before.optics.clamp(shaft, shaft + self.backlash), ..before }
+    }
+}
+
 /// All motions of a lens.
 #[derive(Debug, Clone)]
 pub(crate) struct Trajectory {
     motions: VecDeque<Motion>,
     acceleration: f64,
-    backlash: f64,
+    gear: Gear,
     overshoot: f64,
     bounds: (f64, f64),
     warp: Warp,
@@ -65,14 +90,15 @@ pub(crate) struct Trajectory {
 
 impl Trajectory {
     pub(crate) fn new(config: &LensConfig) -> Self {
-        let rest =
-            LensInstant { motor: config.start.0, optics: config.start.0, velocity: 0.0, moving: false };
+        let rest = LensInstant::resting_at(config.start.0);
+        let ends =
+            config.ends.map_or((f64::NEG_INFINITY, f64::INFINITY), |ends| (ends.min().0, ends.max().0));
         let motions =
             VecDeque::from([Motion { start: 0.0, from: rest, phases: Vec::new(), rest, duration: 0.0 }]);
         Self {
             motions,
             acceleration: config.acceleration,
-            backlash: config.backlash,
+            gear: Gear { backlash: config.backlash, ends },
             overshoot: config.overshoot,
             bounds: (config.range.min().0, config.range.max().0),
             warp: Warp::new(config),
@@ -84,9 +110,9 @@ impl Trajectory {
         let index = self.motions.partition_point(|motion| motion.start <= seconds);
         match self.motions.get(index.saturating_sub(1)) {
             Some(motion) => {
-                motion.at(self.warp.profile_time(seconds - motion.start, motion.duration), self.backlash)
+                motion.at(self.warp.profile_time(seconds - motion.start, motion.duration), self.gear)
             }
-            None => LensInstant { motor: self.bounds.0, optics: self.bounds.0, velocity: 0.0, moving: false },
+            None => LensInstant::resting_at(self.bounds.0),
         }
     }
 
@@ -115,7 +141,7 @@ impl Trajectory {
         if self.motions.len() == MOTIONS_KEPT {
             self.motions.pop_front();
         }
-        self.motions.push_back(Motion::new(seconds, from, phases, self.backlash));
+        self.motions.push_back(Motion::new(seconds, from, phases, self.gear));
     }
 
     /// Lets the lens have stood still from `since` to `until`, and stand there from then on.
@@ -154,42 +180,34 @@ fn bisect(end: f64, reached: impl Fn(f64) -> bool) -> f64 {
 }
 
 impl Motion {
-    fn new(start: f64, from: LensInstant, phases: Vec<Phase>, backlash: f64) -> Self {
+    fn new(start: f64, from: LensInstant, phases: Vec<Phase>, gear: Gear) -> Self {
         let mut duration = 0.0;
         let mut rest = LensInstant { velocity: 0.0, moving: false, ..from };
         let phases = phases
             .into_iter()
             .map(|phase| {
-                let entry = (duration, rest.optics, phase);
+                let entry = (duration, rest, phase);
                 duration += phase.duration;
-                rest.motor = phase.end();
-                rest.optics = play(rest.optics, rest.motor, backlash);
+                rest = gear.turn(rest, phase.end());
                 entry
             })
             .collect();
         Self { start, from, phases, rest, duration }
     }
 
-    fn at(&self, profile_time: f64, backlash: f64) -> LensInstant {
+    fn at(&self, profile_time: f64, gear: Gear) -> LensInstant {
         if profile_time >= self.duration {
             return self.rest;
         }
         let index = self.phases.partition_point(|&(start, ..)| start <= profile_time);
-        let Some(&(start, optics, phase)) = self.phases.get(index.saturating_sub(1)) else {
+        let Some(&(start, before, phase)) = self.phases.get(index.saturating_sub(1)) else {
             return self.from;
         };
-        let motor = phase.position_after(profile_time - start);
+        let velocity = phase.velocity_after(profile_time - start);
         LensInstant {
-            motor,
-            optics: play(optics, motor, backlash),
-            velocity: phase.velocity_after(profile_time - start),
+            velocity,
             moving: true,
+            ..gear.turn(before, phase.position_after(profile_time - start))
         }
     }
-}
-
-/// The optics position after the motor came to `motor` without turning round. Upwards the motor pushes the glass along;
-/// downwards the gap must close first.
-fn play(optics: f64, motor: f64, backlash: f64) -> f64 {
-    optics.clamp(motor, motor + backlash)
 }

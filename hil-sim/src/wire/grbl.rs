@@ -40,13 +40,15 @@ pub(super) struct GrblModel {
     tick: HostMicros,
     reports: u32,
     miscount: f64,
+    /// How far the motor had slipped at the last tick: more means that it has come to a switch at an end of the way.
+    slip: f64,
 }
 
 impl GrblModel {
     pub(super) fn new(motor: Motor) -> Self {
         let state = if motor.needs_homing() { State::Alarm } else { State::Idle };
         let (line, planner) = (Vec::new(), VecDeque::new());
-        Self { motor, line, state, planner, tick: HostMicros(0), reports: 0, miscount: 0.0 }
+        Self { motor, line, state, planner, tick: HostMicros(0), reports: 0, miscount: 0.0, slip: 0.0 }
     }
 
     fn jog(&mut self, words: &str, now: HostMicros) -> Result<(), u16> {
@@ -104,7 +106,7 @@ impl GrblModel {
                     let feed = self.motor.max_speed() / STEPS_PER_MM * 60.0;
                     let homing = u8::from(self.motor.needs_homing());
                     let settings = format!(
-                        "$10=1\r\n$22={homing}\r\n$100={STEPS_PER_MM:.3}\r\n$110={feed:.3}\r\n$120=200.000\r\n"
+                        "$10=1\r\n$21=1\r\n$22={homing}\r\n$100={STEPS_PER_MM:.3}\r\n$110={feed:.3}\r\n$120=200.000\r\n"
                     );
                     replies.extend(settings.bytes());
                     Ok(())
@@ -197,7 +199,14 @@ impl Device for GrblModel {
 
     fn speak(&mut self, now: HostMicros, said: &mut Vec<u8>) {
         self.tick = now + TICK;
+        let slipped = self.motor.slip(now) - std::mem::replace(&mut self.slip, self.motor.slip(now));
         match self.state {
+            State::Jog if slipped.abs() > 0.1 => {
+                self.motor.brake(now);
+                self.planner.clear();
+                self.state = State::Alarm;
+                said.extend(b"ALARM:1\r\n");
+            }
             State::Booting(_) => {
                 self.state = if self.motor.needs_homing() { State::Alarm } else { State::Idle };
                 said.extend(BANNER);

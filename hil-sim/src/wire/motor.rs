@@ -47,6 +47,17 @@ impl Motor {
         lock(&self.state).report(seconds)
     }
 
+    /// What a potentiometer on the shaft says at `time`, counts.
+    fn wiper(&self, time: HostMicros) -> f64 {
+        let seconds = self.seconds(time);
+        lock(&self.state).wiper(seconds)
+    }
+
+    /// How far the motor has slipped at the ends of its way by `time`, counts.
+    pub(super) fn slip(&self, time: HostMicros) -> f64 {
+        lock(&self.state).slip(self.seconds(time))
+    }
+
     pub(super) fn range(&self) -> LensRange {
         lock(&self.state).config().range
     }
@@ -107,6 +118,6 @@ impl DcMotor {
 
     /// What the potentiometer says, counts.
     pub(super) fn position(&self, time: HostMicros) -> f64 {
-        self.motor.report(time).0
+        self.motor.wiper(time)
     }
 }

@@ -36,6 +36,11 @@ The lens goes from one end of its limits (lens.min_counts to lens.max_counts) to
 returns to where it was. Then two slow focus runs tell its play from what the pixels are late by: let the camera see something with \
 structure, and do not move it. Without that everything but the play is measured. Expect one to two minutes.
 
+If an end of the lens's way lies within its limits, it runs into it. A lens that reads its position (firmata, labjack) finds the \
+end and keeps away from it from then on. With limit switches (grbl) the controller locks itself. One that counts steps (moonlite, most \
+behind indi) slips and counts on: then up and down disagree in the picture, and nothing is kept. An optotune lens does not tell \
+where it is: that it sticks is not seen, except that nothing comes into focus.
+
 What was measured is kept in the daemon's state directory for this lens, and every run counts on it; evfocus status and evfocus \
 report show it. lens.backlash_counts in the configuration counts before what was measured.
 

@@ -75,7 +75,7 @@ impl Desk {
         controller.command(Command::Abort, now, actions).map_err(|refusal| refusal.to_string())?;
         let lens = devices::name(&self.lens.model, &self.lens.serial);
         tracing::info!(lens, limits = %settings.limits, "calibrating the lens");
-        let calibrator = Calibrator::new(&settings, self.lens.speed_is_share, lens, now);
+        let calibrator = Calibrator::new(&settings, &self.lens, now);
         self.under_way = Some((calibrator, controller.delays()));
         Ok(())
     }

@@ -6,6 +6,8 @@ use evfocus_core::{HostMicros, LensPosition, LensSample};
 
 /// A lens that does not change its position for this long, and is not where it was sent, has come to an end of its way.
 const STANDSTILL: Duration = Duration::from_secs(2);
+/// A lens that reports a fault after it has not changed its position for this long has been blocked.
+const BLOCKED: Duration = Duration::from_millis(50);
 /// A lens that was stopped, says that it rests, and has kept its position for this long, does rest.
 const SETTLED: Duration = Duration::from_millis(300);
 /// The slowest lens needs less for its range.
@@ -31,6 +33,8 @@ pub(super) struct Leg {
     pub(super) target: LensPosition,
     ordered: HostMicros,
     stopped: Option<HostMicros>,
+    /// Whether the lens itself has given up.
+    blocked: bool,
     changed: (HostMicros, LensPosition),
     /// How near to its target a lens at rest has arrived, counts; less is no motion.
     tolerance: f64,
@@ -44,6 +48,7 @@ impl Leg {
             target,
             ordered,
             stopped: None,
+            blocked: false,
             changed: (ordered, from),
             tolerance,
             samples: Vec::new(),
@@ -53,6 +58,14 @@ impl Leg {
     /// The lens was told to stop.
     pub(super) fn stop(&mut self, now: HostMicros) {
         self.stopped = Some(now);
+    }
+
+    /// The lens reported a fault. Whether it stood still then, as one does that has come to an end of its way; the leg ends with
+    /// its next position.
+    pub(super) fn block(&mut self) -> bool {
+        let stood = self.samples.last().map(|last| last.time().since(self.changed.0));
+        self.blocked = stood.is_some_and(|stood| stood >= BLOCKED);
+        self.blocked
     }
 
     pub(super) fn is_stopped(&self) -> bool {
@@ -72,6 +85,9 @@ impl Leg {
             return Progress::UnderWay;
         }
         self.samples.push(sample);
+        if self.blocked {
+            return Progress::Short;
+        }
         if sample.position.distance(self.changed.1) > tolerance / 2.0 {
             self.changed = (now, sample.position);
         }

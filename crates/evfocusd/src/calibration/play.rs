@@ -7,9 +7,9 @@ use evfocus_core::RunReport;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Difference {
     /// Counts per second.
-    speed: f64,
+    pub(super) speed: f64,
     /// Counts.
-    counts: f64,
+    pub(super) counts: f64,
     /// One standard deviation, counts.
     scatter: f64,
     /// Where the peak is, and its width at half its height, counts.
