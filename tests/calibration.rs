@@ -173,7 +173,7 @@ fn a_fault_on_the_way_ends_it_with_its_name_and_the_lens_stopped() -> Result<()>
         ("grbl", FaultKind::LensUnplugged, &["lens-lost"]),
         ("indi", FaultKind::LensUnplugged, &["lens-lost"]),
         ("labjack", FaultKind::LensSilent, &["lens-silent"]),
-        ("firmata", FaultKind::LensStalled, &["lens-fault"]),
+        ("firmata", FaultKind::LensStalled, &["lens-not-moving"]),
     ] {
         let mut config = config(section(name)?, 1)?;
         let trigger = FaultTrigger::AtPosition(LensPosition(1500.0));

@@ -33,9 +33,9 @@ pub const BAUD: u32 = 115_200;
 const USUAL: Patience = Patience { timeout: Duration::from_millis(100), attempts: 3 };
 /// The driver wakes up with its port.
 const GREETING: Patience = Patience { timeout: Duration::from_millis(500), attempts: 3 };
-/// How often the set-point of a moving lens is read back, for a lens whose device is silent stands within 100 ms. Question and answer take
-/// as long as three set-points: with each of these, or every few, the glass would swing with the rhythm of the gaps.
-const READ_BACK: Duration = Duration::from_millis(40);
+/// How often the set-point of a moving lens is read back. Question and answer take as long as three set-points: with each of them, the
+/// steps would be so coarse that the glass swings with their rhythm.
+const READ_BACK: Duration = Duration::from_millis(10);
 /// However seldom the samples come, a step is no longer than the way of this time.
 const LONGEST_STEP: Duration = Duration::from_millis(20);
 /// The glass has settled when it is this near to its rest, counts,
